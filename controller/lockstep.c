@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Lockstep: the controller answers every joint state of its rate with one command and waits for the next.
+// One thread and one connection, so that messages are handled in the order in which they were sent.
+//
+// Units    ns of motion time.
+// Frames   see tick.h.
+// Arrays   none.
+// Memory   static, lives as long as the process.
+// Errors   see control.h.
+#include "controller/control.h"
+
+#include "base/stop.h" // lw_stop_signal
+
+enum { POLL_MS = 100, ANNOUNCE_POLLS = 10 };
+
+struct lockstep {
+    struct lw_control *control;
+    struct lw_bus *bus;
+    struct lw_world world;
+    struct lw_request request;
+    union lw_message command; // last one sent
+    int64_t plant_session;    // of the state it answers
+    int64_t plant_tick;
+};
+
+static void tick(struct lockstep *l, const struct lw_joint_state *joint)
+{
+    const struct lw_tick_input in = {.time_ns = joint->tick * joint->period_ns,
+                                     .joint = joint,
+                                     .world = &l->world,
+                                     .request = &l->request};
+    lw_tick(&l->control->config, &l->control->state, &in, &l->command.joint_command);
+    l->plant_session = joint->stamp.session;
+    l->plant_tick = joint->tick;
+}
+
+// A state that comes again was sent again because its answer got lost: it gets the same answer.
+static void on_joint_state(struct lockstep *l, const struct lw_joint_state *joint)
+{
+    if (joint->tick % lw_scene_plant_ratio(&l->control->program->scene) != 0)
+        return;
+    const bool answered = joint->stamp.session == l->plant_session && joint->tick == l->plant_tick &&
+                          l->command.joint_command.mode == LW_COMMAND_VELOCITY;
+    if (!answered)
+        tick(l, joint);
+    if (lw_bus_publish(l->bus, LW_CHANNEL_JOINT_COMMAND, &l->command) != LW_OK)
+        lw_program_say(l->control->program, "a command could not be sent; the plant asks again");
+}
+
+static void on_message(void *user, enum lw_channel channel, const union lw_message *message)
+{
+    struct lockstep *l = user;
+    if (channel == LW_CHANNEL_JOINT_STATE)
+        on_joint_state(l, &message->joint_state);
+    else if (channel == LW_CHANNEL_OBSTACLES && lw_world_apply(&l->world, &message->obstacles) != LW_OK)
+        lw_program_say(l->control->program, "more than %d obstacles: a message was refused",
+                       LW_WORLD_MAX);
+    else if (channel == LW_CHANNEL_GOAL || channel == LW_CHANNEL_STOP)
+        l->request = message->request;
+}
+
+static enum lw_status subscribe(struct lockstep *l)
+{
+    static const enum lw_channel channels[] = {LW_CHANNEL_JOINT_STATE, LW_CHANNEL_OBSTACLES, LW_CHANNEL_GOAL,
+                                               LW_CHANNEL_STOP};
+    enum lw_status status = LW_OK;
+    for (size_t i = 0; status == LW_OK && i < sizeof channels / sizeof channels[0]; i++)
+        status = lw_program_subscribe(l->control->program, l->bus, channels[i], on_message, l);
+    return status;
+}
+
+int lw_control_lockstep(struct lw_control *control)
+{
+    static struct lockstep lockstep;
+    lockstep.control = control;
+    if (lw_program_open(control->program, &lockstep.bus) != LW_OK)
+        return 1;
+    if (subscribe(&lockstep) != LW_OK) {
+        lw_bus_close(lockstep.bus);
+        return 1;
+    }
+    lw_program_say(control->program, "ready, in lockstep");
+    for (int poll = 0; lw_stop_signal() == 0; poll++) {
+        if (poll % ANNOUNCE_POLLS == 0)
+            lw_program_announce(control->program, lockstep.bus);
+        if (!lw_bus_handle(lockstep.bus, POLL_MS)) {
+            lw_program_fail(control->program, "the bus failed");
+            break;
+        }
+    }
+    const bool failed = lw_stop_signal() == 0;
+    lw_bus_close(lockstep.bus);
+    return failed ? 1 : lw_stop_exit_status();
+}

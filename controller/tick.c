@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole pipeline on one page: estimate -> select request -> law -> guard -> explain.
+//
+// Units    metres, radians, seconds; ns where a name says so.
+// Frames   base frame of the arm.
+// Arrays   one entry a joint.
+// Memory   see tick.h.
+// Errors   see tick.h.
+#include "controller/tick.h"
+
+#include "base/clock.h"       // LW_NS_PER_S
+#include "base/vec.h"         // lw_vec_*, lw_all_finite
+#include "controller/guard.h" // lw_guard_shape
+
+#include <math.h>   // NAN
+#include <string.h> // memcpy
+
+static const int64_t stale_after_ns = 20 * 1000 * 1000;
+enum { STALE_PERIODS = 3 };
+
+enum lw_status lw_controller_init(struct lw_controller *config, struct lw_controller_state *state,
+                                  const struct lw_scene *scene)
+{
+    if (scene->robot < 0 || scene->robot >= LW_ROBOT_COUNT || scene->law.name != LW_LAW_APF)
+        return LW_E_ARGUMENT;
+    const int64_t period_ns = lw_scene_period_ns(scene->rate_hz);
+    const int64_t patience_ns = STALE_PERIODS * period_ns;
+    *config = (struct lw_controller){.arm = lw_arm_get((enum lw_robot)scene->robot),
+                                     .law = lw_law_get((enum lw_law_name)scene->law.name),
+                                     .params = scene->law,
+                                     .limits = scene->limits,
+                                     .period_ns = period_ns,
+                                     .stale_after_ns = patience_ns > stale_after_ns ? patience_ns : stale_after_ns};
+    memcpy(config->goal, scene->goal, sizeof config->goal);
+    *state = (struct lw_controller_state){.request = {.kind = LW_REQUEST_GOAL}};
+    memcpy(state->request.goal, scene->goal, sizeof state->request.goal);
+    return LW_OK;
+}
+
+// --- estimate ---
+
+// Adopts the plant's own velocity where the plant does not follow our commands: a new plant, or one that ramps to rest.
+static void estimate(struct lw_controller_state *state, const struct lw_tick_input *in)
+{
+    const bool new_plant = in->joint->stamp.session != state->plant_session;
+    if (new_plant || in->joint->mode != LW_PLANT_MOVING)
+        for (int j = 0; j < LW_NJ; j++)
+            state->velocity[j] = isfinite(in->joint->qd[j]) ? in->joint->qd[j] : 0.0;
+    state->plant_session = in->joint->stamp.session;
+}
+
+// --- select request ---
+
+static void select_request(struct lw_controller_state *state, const struct lw_request *request)
+{
+    const struct lw_stamp *now = &state->request.stamp, *next = &request->stamp;
+    if (next->session != 0 && (next->session != now->session || next->seq != now->seq))
+        state->request = *request;
+}
+
+// --- law ---
+
+// Reasons to brake to rest instead of asking the law.
+static unsigned brake_reasons(const struct lw_controller *config, const struct lw_controller_state *state,
+                              const struct lw_tick_input *in)
+{
+    unsigned flags = 0;
+    if (in->world->version == 0)
+        flags |= LW_WAITING;
+    if (state->request.kind == LW_REQUEST_STOP)
+        flags |= LW_STOPPED;
+    if (in->state_age_ns > config->stale_after_ns)
+        flags |= LW_STALE;
+    return flags;
+}
+
+// Asks the law at the measured configuration. A configuration that is no number gives no wish either.
+static void ask_law(const struct lw_controller *config, const struct lw_controller_state *state,
+                    const struct lw_tick_input *in, struct lw_pose frame[LW_NJ], struct lw_law_output *law)
+{
+    if (lw_arm_fk(config->arm, in->joint->q, frame) == LW_OK) {
+        const struct lw_law_input law_in = {.frame = frame, .world = in->world, .goal = state->request.goal};
+        config->law->step(&config->params, &law_in, law);
+        return;
+    }
+    *law = (struct lw_law_output){.qd = {NAN, NAN, NAN, NAN, NAN, NAN}, .nearest = {.distance = -1}};
+    memset(frame, 0, LW_NJ * sizeof *frame);
+}
+
+// --- explain ---
+
+static void explain(const struct lw_controller_state *state, const struct lw_tick_input *in, const double tip[3],
+                    const struct lw_law_output *law, struct lw_joint_command *out)
+{
+    double to_goal[3];
+    lw_vec_sub(state->request.goal, tip, to_goal);
+    out->plant_session = in->joint->stamp.session;
+    out->state_seq = in->joint->stamp.seq;
+    out->state_tick = in->joint->tick;
+    out->state_mono_ns = in->joint->stamp.mono_ns;
+    memcpy(out->qd_law, law->qd, sizeof out->qd_law);
+    memcpy(out->q, in->joint->q, sizeof out->q);
+    memcpy(out->goal, state->request.goal, sizeof out->goal);
+    out->request = state->request.stamp;
+    out->world = in->world->last;
+    out->world_version = in->world->version;
+    out->obstacle_count = in->world->count;
+    out->deviation = lw_vec_norm(to_goal);
+    out->nearest = law->nearest;
+    out->tick = state->tick;
+    out->tick_ns = in->time_ns;
+    out->state_age_ns = in->state_age_ns;
+}
+
+void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
+             struct lw_joint_command *out)
+{
+    static const double rest[LW_NJ] = {0};
+    struct lw_pose frame[LW_NJ];
+    struct lw_law_output law;
+    *out = (struct lw_joint_command){0};
+    state->tick++;
+
+    estimate(state, in);
+    select_request(state, in->request);
+    ask_law(config, state, in, frame, &law);
+
+    // The guard has the last word; a reason to brake replaces the law's wish by rest.
+    out->flags = brake_reasons(config, state, in);
+    const double *wish = out->flags ? rest : law.qd;
+    const double period_s = (double)config->period_ns / (double)LW_NS_PER_S;
+    out->flags |= lw_guard_shape(&config->limits, period_s, in->joint->q, state->velocity, wish, out->qd);
+    out->mode = (out->flags & LW_WAITING) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
+    memcpy(state->velocity, out->qd, sizeof state->velocity);
+
+    explain(state, in, frame[LW_NJ - 1].p, &law, out);
+}
+
+bool lw_controller_at_rest(const struct lw_controller_state *state)
+{
+    for (int j = 0; j < LW_NJ; j++)
+        if (state->velocity[j] != 0.0)
+            return false;
+    return true;
+}

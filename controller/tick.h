@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tick: one period of the controller as a pure function. The live process, lockstep, batch runs and tests call it.
+//
+// Units    metres, radians, seconds; ns where a name says so.
+// Frames   base frame of the arm.
+// Arrays   one entry a joint, base to wrist 3.
+// Memory   no allocation, no static state; all that lives from tick to tick is in struct lw_controller_state.
+// Errors   init refuses a bad configuration; a tick cannot fail, it brakes and says why in its flags.
+#ifndef LW_CONTROLLER_TICK_H
+#define LW_CONTROLLER_TICK_H
+
+#include "arm/joint.h"       // struct lw_joint_state, struct lw_joint_command, struct lw_request
+#include "collision/world.h" // struct lw_world
+#include "controller/law.h"  // struct lw_law
+#include "scene/scene.h"     // struct lw_scene
+
+#include <stdbool.h> // bool
+
+// Constant for the life of a run.
+struct lw_controller {
+    const struct lw_arm *arm;
+    const struct lw_law *law;
+    struct lw_law_params params;
+    struct lw_limits limits;
+    int64_t period_ns;      // nominal tick
+    int64_t stale_after_ns; // a joint state older than this brakes the arm
+    double goal[3];         // m, until a GOAL message comes
+};
+
+// Lives from tick to tick.
+struct lw_controller_state {
+    int64_t tick;              // ticks so far
+    int64_t plant_session;     // plant being controlled, 0 = none yet
+    double velocity[LW_NJ];    // rad/s, command in force
+    struct lw_request request; // request in force
+};
+
+struct lw_tick_input {
+    int64_t time_ns;                    // the tick's own time
+    int64_t state_age_ns;               // age of *joint at time_ns
+    const struct lw_joint_state *joint; // newest joint state
+    const struct lw_world *world;       // newest snapshot; version 0 = nothing heard yet
+    const struct lw_request *request;   // newest request; session 0 = none yet
+};
+
+// Everything a run of `scene` needs. Fails LW_E_ARGUMENT when the scene names no known robot or law.
+LW_MUST_CHECK enum lw_status lw_controller_init(struct lw_controller *config, struct lw_controller_state *state,
+                                                const struct lw_scene *scene);
+
+// One tick: estimate, select request, law, guard, explain.
+//   out  command and explanation; stamp, wake_late_ns, previous_exec_ns and skipped are left 0 for the process to fill
+// Cost: fixed plus linear in the number of obstacles.
+void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
+             struct lw_joint_command *out);
+
+// True when the command in force is zero.
+bool lw_controller_at_rest(const struct lw_controller_state *state);
+
+#endif

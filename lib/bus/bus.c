@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The only code that talks to LCM.
+//
+// Units    ms for timeouts.
+// Frames   none.
+// Arrays   none.
+// Memory   see bus.h.
+// Errors   see bus.h.
+#define _GNU_SOURCE // strerrordesc_np
+#include "bus/bus.h"
+
+#include "base/build.h" // LW_BUILD
+#include "base/clock.h" // lw_clock_mono_ns, lw_clock_utime
+
+#include <arpa/inet.h>  // inet_pton
+#include <errno.h>      // errno
+#include <lcm/lcm.h>    // lcm_*
+#include <stdatomic.h>  // atomic_int_fast64_t
+#include <stdlib.h>     // calloc, getenv
+#include <string.h>     // strerrordesc_np
+#include <sys/socket.h> // socket, connect
+#include <unistd.h>     // close
+
+#include <leeway_scene_t.h>
+
+enum { CHANNEL_NAME_MAX = 64, NAME_MAX_LENGTH = 32, QUEUE_CAPACITY = 64 };
+
+static const char default_url[] = "udpm://239.255.76.67:7667?ttl=0";
+
+struct subscription {
+    struct lw_bus *bus;
+    enum lw_channel channel;
+    lw_bus_handler handler;
+    void *user;
+};
+
+struct lw_bus {
+    lcm_t *lcm;
+    int64_t session;
+    char name[NAME_MAX_LENGTH];
+    char channel_name[LW_CHANNEL_COUNT][CHANNEL_NAME_MAX];
+    int64_t seq[LW_CHANNEL_COUNT];
+    int64_t scene_seq;
+    unsigned char buffer[LW_WIRE_MAX];
+    struct subscription subscription[LW_CHANNEL_COUNT];
+    atomic_int_fast64_t refused;
+};
+
+// --- open ---
+
+// Splits udpm://ADDRESS:PORT. Returns whether the URL is of that form.
+static bool parse_url(const char *url, struct sockaddr_in *address)
+{
+    char host[64];
+    int port = 0;
+    if (sscanf(url, "udpm://%63[0-9.]:%d", host, &port) != 2 || port <= 0 || port > UINT16_MAX)
+        return false;
+    *address = (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
+    return inet_pton(AF_INET, host, &address->sin_addr) == 1;
+}
+
+// Asks the kernel for a route before LCM does, which would print a page of its own.
+static bool has_route(const struct sockaddr_in *address)
+{
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    if (fd < 0)
+        return false;
+    const bool ok = connect(fd, (const struct sockaddr *)(const void *)address, sizeof *address) == 0;
+    const int problem = errno;
+    close(fd);
+    errno = problem;
+    return ok;
+}
+
+static enum lw_status check_url(const char *url, struct lw_error *error)
+{
+    struct sockaddr_in address;
+    if (!parse_url(url, &address)) {
+        snprintf(error->text, sizeof error->text,
+                 "LCM URL: expected udpm://ADDRESS:PORT?ttl=N, as in %s, found \"%.100s\"", default_url, url);
+        return LW_E_BUS;
+    }
+    if (!has_route(&address)) {
+        snprintf(error->text, sizeof error->text,
+                 "no multicast route for %.60s (%s); for this host alone: "
+                 "sudo ip link set lo multicast on && sudo ip route add 224.0.0.0/4 dev lo",
+                 url, strerrordesc_np(errno));
+        return LW_E_BUS;
+    }
+    return LW_OK;
+}
+
+// OBSTACLES is shared by all robots of a bus; every other channel belongs to one.
+static void name_channels(struct lw_bus *bus, const char *name)
+{
+    if (name != NULL && name[0] != '\0')
+        snprintf(bus->name, sizeof bus->name, "%.30s_", name);
+    for (int c = 0; c < LW_CHANNEL_COUNT; c++)
+        snprintf(bus->channel_name[c], CHANNEL_NAME_MAX, "%s%s", c == LW_CHANNEL_OBSTACLES ? "" : bus->name,
+                 lw_wire_channel_name((enum lw_channel)c));
+}
+
+enum lw_status lw_bus_open(const struct lw_bus_config *config, struct lw_bus **out, struct lw_error *error)
+{
+    const char *from_environment = getenv("LCM_DEFAULT_URL"); // NOLINT(concurrency-mt-unsafe): nobody sets it
+    const char *url = config->url ? config->url : from_environment ? from_environment : default_url;
+    enum lw_status status = check_url(url, error);
+    if (status != LW_OK)
+        return status;
+    struct lw_bus *bus = calloc(1, sizeof *bus);
+    if (bus != NULL)
+        bus->lcm = lcm_create(url);
+    if (bus == NULL || bus->lcm == NULL) {
+        snprintf(error->text, sizeof error->text, "LCM cannot open %.200s", url);
+        free(bus);
+        return LW_E_BUS;
+    }
+    bus->session = config->session;
+    name_channels(bus, config->name);
+    // LCM computes each fingerprint on first use, without a lock: do it before threads start.
+    for (int c = 0; c < LW_CHANNEL_COUNT; c++)
+        (void)lw_wire_fingerprint((enum lw_channel)c);
+    *out = bus;
+    return LW_OK;
+}
+
+void lw_bus_close(struct lw_bus *bus)
+{
+    if (bus == NULL)
+        return;
+    lcm_destroy(bus->lcm);
+    free(bus);
+}
+
+// --- receive ---
+
+// Own raw handler: LCM's generated one prints a line for every malformed message and counts nothing.
+static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *user)
+{
+    (void)channel;
+    struct subscription *s = user;
+    union lw_message message;
+    if (lw_wire_decode(s->channel, buf->data, buf->data_size, &message) == LW_OK)
+        s->handler(s->user, s->channel, &message);
+    else
+        atomic_fetch_add_explicit(&s->bus->refused, 1, memory_order_relaxed);
+}
+
+enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler, void *user,
+                                struct lw_error *error)
+{
+    struct subscription *s = &bus->subscription[channel];
+    *s = (struct subscription){.bus = bus, .channel = channel, .handler = handler, .user = user};
+    lcm_subscription_t *made = lcm_subscribe(bus->lcm, bus->channel_name[channel], handle_raw, s);
+    if (made == NULL) {
+        snprintf(error->text, sizeof error->text,
+                 "the bus does not hear its own messages: multicast is blocked on this host (firewall, or lo without "
+                 "multicast: sudo ip link set lo multicast on)");
+        return LW_E_BUS;
+    }
+    // When a queue is full LCM drops the newest message: keep it long and drain it.
+    lcm_subscription_set_queue_capacity(made, QUEUE_CAPACITY);
+    return LW_OK;
+}
+
+bool lw_bus_handle(struct lw_bus *bus, int timeout_ms)
+{
+    int handled = lcm_handle_timeout(bus->lcm, timeout_ms);
+    while (handled > 0)
+        handled = lcm_handle_timeout(bus->lcm, 0);
+    return handled == 0 || errno == EINTR; // a signal only ends the wait
+}
+
+int64_t lw_bus_refused(const struct lw_bus *bus)
+{
+    return atomic_load_explicit(&bus->refused, memory_order_relaxed);
+}
+
+// --- publish ---
+
+static struct lw_stamp make_stamp(const struct lw_bus *bus, int64_t seq)
+{
+    return (struct lw_stamp){
+        .utime = lw_clock_utime(), .mono_ns = lw_clock_mono_ns(), .session = bus->session, .seq = seq};
+}
+
+enum lw_status lw_bus_publish(struct lw_bus *bus, enum lw_channel channel, union lw_message *message)
+{
+    message->stamp = make_stamp(bus, ++bus->seq[channel]);
+    const uint32_t size = lw_wire_encode(channel, message, bus->buffer);
+    return lcm_publish(bus->lcm, bus->channel_name[channel], bus->buffer, size) == 0 ? LW_OK : LW_E_BUS;
+}
+
+enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scene *scene)
+{
+    const struct lw_stamp stamp = make_stamp(bus, ++bus->scene_seq);
+    // LCM's strings are not const though encoding only reads them.
+    const leeway_scene_t w = {.h = {stamp.utime, stamp.mono_ns, stamp.session, stamp.seq},
+                              .program = (char *)(uintptr_t)scene->program,
+                              .build = (char *)(uintptr_t)LW_BUILD,
+                              .mode = (char *)(uintptr_t)scene->mode,
+                              .file = (char *)(uintptr_t)scene->file,
+                              .yaml = (char *)(uintptr_t)scene->yaml};
+    char channel[CHANNEL_NAME_MAX];
+    snprintf(channel, sizeof channel, "%sSCENE", bus->name);
+    return leeway_scene_t_publish(bus->lcm, channel, &w) == 0 ? LW_OK : LW_E_BUS;
+}

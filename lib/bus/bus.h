@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bus: one LCM connection. Opens, subscribes with own checked handlers, publishes from its own buffer.
+//
+// Units    ms for timeouts.
+// Frames   none.
+// Arrays   none.
+// Memory   open and subscribe allocate; publish and handle do not. One thread handles, one publishes.
+// Errors   open and subscribe say what to do in struct lw_error; refused messages are counted, not printed.
+#ifndef LW_BUS_BUS_H
+#define LW_BUS_BUS_H
+
+#include "base/schema.h" // struct lw_error
+#include "bus/wire.h"    // enum lw_channel, union lw_message
+
+#include <stdint.h> // int64_t
+
+struct lw_bus;
+
+// How to open a bus.
+struct lw_bus_config {
+    const char *url;     // NULL = LCM_DEFAULT_URL, else the default: multicast that stays on this host
+    const char *name;    // robot's prefix of the channels JOINT_STATE, JOINT_COMMAND, GOAL, STOP, SCENE; NULL = none
+    int64_t session;     // from lw_clock_session, one per process
+};
+
+typedef void (*lw_bus_handler)(void *user, enum lw_channel channel, const union lw_message *message);
+
+// Opens a bus. Fails LW_E_BUS: no multicast route, bad URL.
+LW_MUST_CHECK enum lw_status lw_bus_open(const struct lw_bus_config *config, struct lw_bus **bus,
+                                         struct lw_error *error);
+void lw_bus_close(struct lw_bus *bus);
+
+// Calls handler(user, ...) from lw_bus_handle for every valid message of a channel. The first call of a bus starts
+// LCM's read thread, which inherits the caller's scheduling. Fails LW_E_BUS when the bus does not hear itself.
+LW_MUST_CHECK enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler,
+                                              void *user, struct lw_error *error);
+
+// Waits up to timeout_ms for messages and hands all that came to their handlers. False when the bus failed.
+bool lw_bus_handle(struct lw_bus *bus, int timeout_ms);
+
+// Stamps (session, next seq of the channel, clocks), encodes and sends a message. The stamp used is written back.
+// Fails LW_E_BUS when the system refused to send. Cost: one system call, no allocation.
+LW_MUST_CHECK enum lw_status lw_bus_publish(struct lw_bus *bus, enum lw_channel channel, union lw_message *message);
+
+// What a process runs, for the log (lcmtypes/scene_t.lcm). Allocates: not for real-time threads.
+struct lw_bus_scene {
+    const char *program, *mode, *file, *yaml;
+};
+LW_MUST_CHECK enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scene *scene);
+
+// Messages refused since open, all channels.
+int64_t lw_bus_refused(const struct lw_bus *bus);
+
+#endif

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Merging obstacle messages into the world.
+//
+// Units    metres.
+// Frames   base frame.
+// Arrays   see world.h.
+// Memory   the caller's; one working copy on the stack.
+// Errors   see world.h.
+#include "collision/world.h"
+
+#include "base/vec.h" // lw_vec_*
+
+#include <stdbool.h> // bool
+#include <stddef.h>  // NULL
+
+double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3], double away[3])
+{
+    lw_vec_sub(x, obstacle->p, away);
+    const double n = lw_vec_norm(away);
+    for (int i = 0; i < 3; i++)
+        away[i] = n > 0 ? away[i] / n : 0.0;
+    return n - obstacle->radius;
+}
+
+static int find(const struct lw_world *world, int id)
+{
+    for (int i = 0; i < world->count; i++)
+        if (world->obstacle[i].id == id)
+            return i;
+    return -1;
+}
+
+static bool same(const struct lw_obstacle *a, const struct lw_obstacle *b)
+{
+    return a->id == b->id && a->session == b->session && a->radius == b->radius && a->p[0] == b->p[0] &&
+           a->p[1] == b->p[1] && a->p[2] == b->p[2];
+}
+
+static bool mentions(const struct lw_obstacle_change *change, int id)
+{
+    for (int i = 0; i < change->count; i++)
+        if (change->obstacle[i].id == id)
+            return true;
+    return false;
+}
+
+// Drops every obstacle that the change removes; returns how many. The order of the others is kept.
+static int drop(struct lw_world *world, const struct lw_obstacle_change *change)
+{
+    int kept = 0;
+    for (int i = 0; i < world->count; i++) {
+        const struct lw_obstacle *o = &world->obstacle[i];
+        const bool listed = change->op != LW_CLEAR && mentions(change, o->id);
+        const bool gone = change->op == LW_CLEAR || (change->op == LW_REMOVE && listed) ||
+                          (change->op == LW_REPLACE && o->session == change->stamp.session && !listed);
+        if (!gone)
+            world->obstacle[kept++] = *o;
+    }
+    const int dropped = world->count - kept;
+    world->count = kept;
+    return dropped;
+}
+
+// Adds or overwrites one obstacle. Returns whether the world differs now; *full when there was no room.
+static bool put(struct lw_world *world, struct lw_obstacle obstacle, int64_t session, bool *full)
+{
+    obstacle.session = session;
+    int at = find(world, obstacle.id);
+    if (at >= 0 && same(&world->obstacle[at], &obstacle))
+        return false;
+    if (at < 0 && world->count == LW_WORLD_MAX) {
+        *full = true;
+        return false;
+    }
+    if (at < 0)
+        at = world->count++;
+    world->obstacle[at] = obstacle;
+    return true;
+}
+
+enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change)
+{
+    struct lw_world next = *world;
+    bool changed = drop(&next, change) > 0;
+
+    bool full = false;
+    if (change->op == LW_UPSERT || change->op == LW_REPLACE)
+        for (int i = 0; i < change->count; i++)
+            changed |= put(&next, change->obstacle[i], change->stamp.session, &full);
+    if (full)
+        return LW_E_FULL;
+
+    // Hearing anything at all is version 1: an empty world is known, not unheard of.
+    next.version += changed || next.version == 0;
+    next.last = change->stamp;
+    *world = next;
+    return LW_OK;
+}

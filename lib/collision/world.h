@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// World: the set of obstacles that the controller believes in, merged from messages of any number of sources.
+//
+// Units    metres.
+// Frames   base frame of the arm.
+// Arrays   obstacles in no particular order; ids are unique.
+// Memory   fixed capacity, plain data: a copy is a snapshot.
+// Errors   enum lw_status; a change is taken whole or not at all.
+#ifndef LW_COLLISION_WORLD_H
+#define LW_COLLISION_WORLD_H
+
+#include "base/stamp.h"  // struct lw_stamp
+#include "base/status.h" // enum lw_status
+
+enum { LW_WORLD_MAX = 256, LW_CHANGE_MAX = 32 };
+
+// A point (radius 0) or a sphere.
+struct lw_obstacle {
+    int id;          // > 0
+    double p[3];     // m, centre
+    double radius;   // m, >= 0
+    int64_t session; // source that owns it: the last one that sent this id
+};
+
+enum lw_change_op { LW_UPSERT, LW_REMOVE, LW_REPLACE, LW_CLEAR };
+
+// One change of the set, as a source sends it.
+struct lw_obstacle_change {
+    struct lw_stamp stamp;
+    enum lw_change_op op;
+    int count;
+    struct lw_obstacle obstacle[LW_CHANGE_MAX]; // session is ignored: the stamp names the source
+};
+
+struct lw_world {
+    int64_t version;      // number of changes of the set so far; 0 = nothing heard
+    struct lw_stamp last; // session and seq of the newest message taken in
+    int count;
+    struct lw_obstacle obstacle[LW_WORLD_MAX];
+};
+
+// Signed distance from point x to an obstacle's surface, and the direction of growing distance.
+//   away  out  [3] unit vector from the obstacle's centre to x; zero when x is the centre
+double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3], double away[3]);
+
+// Applies a change. The version grows only when the set really differs; a repeated message changes nothing.
+// An id belongs to the source that sent it last; REMOVE and CLEAR reach obstacles of every source.
+// Fails LW_E_FULL when the result would exceed LW_WORLD_MAX; the world is unchanged then. Cost: O(changes * count).
+LW_MUST_CHECK enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change);
+
+#endif

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Reading a scene: defaults of its robot, then its keys, then the checks that concern several keys at once.
+//
+// Units    metres, radians, seconds, Hz.
+// Frames   base frame of the arm.
+// Arrays   see scene.h.
+// Memory   the file's text is freed before return.
+// Errors   see scene.h.
+#define _GNU_SOURCE // strerrordesc_np
+#include "scene/scene.h"
+
+#include <errno.h>  // errno
+#include <math.h>   // round, llround
+#include <stdarg.h> // va_list
+#include <stdlib.h> // malloc, free
+#include <string.h> // strerrordesc_np
+
+enum { FILE_MAX = 1 << 20 };
+
+static enum lw_status refuse(struct lw_error *error, const struct lw_source *source, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+static enum lw_status refuse(struct lw_error *error, const struct lw_source *source, const char *format, ...)
+{
+    char what[400];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(what, sizeof what, format, args);
+    va_end(args);
+    snprintf(error->text, sizeof error->text, "%.100s: %s", source->name, what);
+    return LW_E_SCENE;
+}
+
+// Keys whose default is another key's value.
+static void resolve(struct lw_scene *scene)
+{
+    if (scene->plant.rate_hz == 0)
+        scene->plant.rate_hz = scene->rate_hz;
+    for (int i = 0; i < scene->obstacle_count; i++)
+        if (scene->obstacle[i].id == 0)
+            scene->obstacle[i].id = i + 1;
+}
+
+static enum lw_status check_start(const struct lw_scene *scene, const struct lw_source *source,
+                                  struct lw_error *error)
+{
+    for (int j = 0; j < LW_NJ; j++) {
+        const double low = scene->limits.position_min[j], high = scene->limits.position_max[j];
+        if (low >= high)
+            return refuse(error, source, "limits: joint %d: expected position_min < position_max, found %g and %g",
+                          j + 1, low, high);
+        if (scene->q0[j] < low || scene->q0[j] > high)
+            return refuse(error, source, "q0: joint %d: expected %g to %g (rad, its range), found %g", j + 1, low,
+                          high, scene->q0[j]);
+    }
+    return LW_OK;
+}
+
+static enum lw_status check_rates(const struct lw_scene *scene, const struct lw_source *source,
+                                  struct lw_error *error)
+{
+    const double ratio = scene->plant.rate_hz / scene->rate_hz;
+    if (ratio < 1 || fabs(ratio - round(ratio)) > 1e-9)
+        return refuse(error, source, "plant.rate_hz: expected a whole multiple of rate_hz = %g, found %g",
+                      scene->rate_hz, scene->plant.rate_hz);
+    if (scene->plant.timeout_s * scene->rate_hz < 2)
+        return refuse(error, source, "plant.timeout_s: expected at least two controller periods, %g s, found %g",
+                      2 / scene->rate_hz, scene->plant.timeout_s);
+    return LW_OK;
+}
+
+static enum lw_status check_obstacles(const struct lw_scene *scene, const struct lw_source *source,
+                                      struct lw_error *error)
+{
+    for (int i = 0; i < scene->obstacle_count; i++)
+        for (int k = 0; k < i; k++)
+            if (scene->obstacle[i].id == scene->obstacle[k].id)
+                return refuse(error, source, "obstacles.%d.id: expected a number of its own, found %d again", i,
+                              scene->obstacle[i].id);
+    return LW_OK;
+}
+
+// The robot decides the defaults, so it is read before everything else.
+static enum lw_status read_robot(const struct lw_source *source, enum lw_robot *robot, struct lw_error *error)
+{
+    struct lw_scene probe = lw_scene_defaults(LW_UR5);
+    enum lw_status status = lw_schema_read(lw_scene_keys(), source, &probe, sizeof probe, error);
+    *robot = (enum lw_robot)probe.robot;
+    return status;
+}
+
+enum lw_status lw_scene_read(const struct lw_source *source, struct lw_scene *scene, struct lw_error *error)
+{
+    enum lw_robot robot = LW_UR5;
+    enum lw_status status = read_robot(source, &robot, error);
+    struct lw_scene next = lw_scene_defaults(robot);
+    if (status == LW_OK)
+        status = lw_schema_read(lw_scene_keys(), source, &next, sizeof next, error);
+    if (status == LW_OK)
+        resolve(&next);
+    if (status == LW_OK)
+        status = check_start(&next, source, error);
+    if (status == LW_OK)
+        status = check_rates(&next, source, error);
+    if (status == LW_OK)
+        status = check_obstacles(&next, source, error);
+    if (status == LW_OK)
+        *scene = next;
+    return status;
+}
+
+// Reads a whole file; NULL with errno set when that fails. The caller frees.
+static char *read_file(const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    if (file == NULL)
+        return NULL;
+    char *text = calloc(1, FILE_MAX + 1);
+    const size_t length = text != NULL ? fread(text, 1, FILE_MAX + 1, file) : 0;
+    const int problem = ferror(file) ? errno : length > FILE_MAX ? EFBIG : 0;
+    fclose(file);
+    if (text == NULL || problem == 0)
+        return text;
+    free(text);
+    errno = problem;
+    return NULL;
+}
+
+enum lw_status lw_scene_load(const char *path, const char *const *set, int set_count, struct lw_scene *scene,
+                             struct lw_error *error)
+{
+    char *text = read_file(path);
+    if (text == NULL) {
+        snprintf(error->text, sizeof error->text, "%.200s: cannot read the scene: %s", path, strerrordesc_np(errno));
+        return LW_E_IO;
+    }
+    const struct lw_source source = {.name = path, .text = text, .set = set, .set_count = set_count};
+    enum lw_status status = lw_scene_read(&source, scene, error);
+    free(text);
+    return status;
+}
+
+void lw_scene_write(const struct lw_scene *scene, FILE *to)
+{
+    lw_schema_write(lw_scene_keys(), scene, to);
+}
+
+void lw_scene_describe(FILE *to)
+{
+    const struct lw_scene defaults = lw_scene_defaults(LW_UR5);
+    lw_schema_describe(lw_scene_keys(), &defaults, to);
+}
+
+int64_t lw_scene_steps(const struct lw_scene *scene)
+{
+    return llround(scene->duration_s * scene->rate_hz);
+}
+
+int lw_scene_plant_ratio(const struct lw_scene *scene)
+{
+    return (int)lround(scene->plant.rate_hz / scene->rate_hz);
+}
+
+int64_t lw_scene_period_ns(double rate_hz)
+{
+    return llround(1e9 / rate_hz);
+}
+
+void lw_scene_obstacles(const struct lw_scene *scene, struct lw_obstacle_change *change)
+{
+    *change = (struct lw_obstacle_change){.op = LW_REPLACE, .count = scene->obstacle_count};
+    for (int i = 0; i < scene->obstacle_count; i++) {
+        const struct lw_scene_obstacle *from = &scene->obstacle[i];
+        change->obstacle[i] = (struct lw_obstacle){
+            .id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .radius = from->radius};
+    }
+}

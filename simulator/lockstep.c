@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Lockstep: one plant step, then wait for the controller's answer to it. What gets lost is sent again, so a scene
+// always gives the same result, as fast as the machine allows.
+//
+// Units    ns; motion time for the plant, CLOCK_MONOTONIC for waiting.
+// Frames   see plant.h.
+// Arrays   none.
+// Memory   static, lives as long as the process.
+// Errors   see simulation.h.
+#include "simulator/simulation.h"
+
+#include "base/clock.h" // lw_clock_mono_ns
+#include "base/stop.h"  // lw_stop_signal
+
+enum { RESEND_MS = 100 };
+static const int64_t patience_ns = 5 * LW_NS_PER_S; // for an answer, once there was a first one
+
+struct lockstep {
+    struct lw_simulation *simulation;
+    struct lw_bus *bus;
+    bool answered;         // the state published last
+    bool started;          // a first answer came
+    int64_t wanted_since;  // CLOCK_MONOTONIC when the state was published first
+};
+
+// Takes the answer to the state published last. The first one must also have seen the scene's obstacles.
+static void on_command(void *user, enum lw_channel channel, const union lw_message *message)
+{
+    (void)channel;
+    struct lockstep *l = user;
+    struct lw_simulation *s = l->simulation;
+    const struct lw_joint_command *command = &message->joint_command;
+    const bool sees_world = l->started || command->world.session == s->plant.session;
+    if (l->answered || command->state_tick != s->arm.tick || !sees_world)
+        return;
+    const int64_t now_ns = s->arm.tick * s->plant.period_ns;
+    l->answered = lw_plant_accept(&s->plant, &s->arm, command, now_ns) == LW_ACCEPTED;
+    l->started |= l->answered;
+}
+
+static enum lw_status publish(struct lockstep *l)
+{
+    enum lw_status status = LW_OK;
+    if (!l->started)
+        status = lw_simulation_publish_obstacles(l->simulation, l->bus);
+    return status == LW_OK ? lw_simulation_publish_state(l->simulation, l->bus) : status;
+}
+
+// Publishes the state until it is answered. False when stopped or given up.
+static bool ask(struct lockstep *l)
+{
+    const struct lw_program *program = l->simulation->program;
+    l->answered = false;
+    l->wanted_since = lw_clock_mono_ns();
+    while (!l->answered && lw_stop_signal() == 0) {
+        if (l->started && lw_clock_mono_ns() - l->wanted_since > patience_ns) {
+            lw_program_fail(program, "no answer from the controller for 5 s at t = %.3f s",
+                            (double)l->simulation->arm.tick * l->simulation->plant.period_s);
+            return false;
+        }
+        if (publish(l) != LW_OK || !lw_bus_handle(l->bus, RESEND_MS)) {
+            lw_program_fail(program, "the bus failed");
+            return false;
+        }
+    }
+    return l->answered;
+}
+
+// One controller period: ask, then step the plant; states in between are published for the log alone.
+static bool step(struct lockstep *l)
+{
+    struct lw_simulation *s = l->simulation;
+    const int ratio = lw_scene_plant_ratio(&s->program->scene);
+    if (!ask(l))
+        return false;
+    if (s->arm.tick >= s->last_tick)
+        return true;
+    for (int i = 0; i < ratio; i++) {
+        lw_plant_step(&s->plant, &s->arm, s->arm.tick * s->plant.period_ns);
+        if (i < ratio - 1 && lw_simulation_publish_state(s, l->bus) != LW_OK) {
+            lw_program_fail(s->program, "the bus failed");
+            return false;
+        }
+    }
+    return true;
+}
+
+int lw_simulation_lockstep(struct lw_simulation *simulation)
+{
+    static struct lockstep lockstep;
+    const struct lw_program *program = simulation->program;
+    lockstep.simulation = simulation;
+    if (lw_program_open(program, &lockstep.bus) != LW_OK)
+        return 1;
+    bool ok = lw_program_subscribe(program, lockstep.bus, LW_CHANNEL_JOINT_COMMAND, on_command, &lockstep) == LW_OK;
+    if (ok) {
+        lw_program_announce(program, lockstep.bus);
+        lw_program_say(program, "waiting for leeway-controller --lockstep %s", program->path);
+    }
+    bool done = false;
+    while (ok && !done) {
+        done = simulation->arm.tick >= simulation->last_tick;
+        ok = step(&lockstep);
+    }
+    if (ok)
+        lw_program_say(program, "done, %.3f s of motion", (double)simulation->arm.tick * simulation->plant.period_s);
+    lw_bus_close(lockstep.bus);
+    return ok || lw_stop_signal() != 0 ? lw_stop_exit_status() : 1;
+}

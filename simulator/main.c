@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// leeway-simulator: command line, wiring, and the choice between live and lockstep.
+//
+// Units    none.
+// Frames   none.
+// Arrays   none.
+// Memory   static, lives as long as the process.
+// Errors   exit status 0 ok, 1 failed, 2 usage or scene refused, 130 after Ctrl-C.
+#include "simulator/simulation.h"
+
+#include "base/stop.h" // lw_stop_install
+
+enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulation, struct lw_bus *bus)
+{
+    union lw_message message;
+    lw_plant_report(&simulation->plant, &simulation->arm, &message.joint_state);
+    return lw_bus_publish(bus, LW_CHANNEL_JOINT_STATE, &message);
+}
+
+enum lw_status lw_simulation_publish_obstacles(const struct lw_simulation *simulation, struct lw_bus *bus)
+{
+    union lw_message message;
+    lw_scene_obstacles(&simulation->program->scene, &message.obstacles);
+    return lw_bus_publish(bus, LW_CHANNEL_OBSTACLES, &message);
+}
+
+int main(int argc, char **argv)
+{
+    static struct lw_program program = {
+        .name = "leeway-simulator",
+        .summary = "A kinematic arm on the bus: publishes JOINT_STATE at its own rate, obeys JOINT_COMMAND within its "
+                   "limits, and reports the scene's obstacles on OBSTACLES as a sensor would.\v"
+                   "It holds still until a controller commands it, and ramps to rest when commands cease.\n\n"
+                   "Example, in two terminals:\n"
+                   "  leeway-simulator scenarios/c1.yaml\n"
+                   "  leeway-controller scenarios/c1.yaml",
+        .has_until_done = true,
+    };
+    static struct lw_simulation simulation = {.program = &program};
+    lw_program_start(&program, argc, argv);
+    lw_plant_init(&simulation.plant, &simulation.arm, &program.scene, program.bus_config.session);
+    simulation.last_tick = lw_scene_steps(&program.scene) * lw_scene_plant_ratio(&program.scene);
+    lw_stop_install();
+    return program.lockstep ? lw_simulation_lockstep(&simulation) : lw_simulation_live(&simulation);
+}

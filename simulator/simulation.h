@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Simulation: the two ways of running the plant in a process of its own.
+//
+// Units    see plant.h.
+// Frames   see plant.h.
+// Arrays   none.
+// Memory   lives as long as the process.
+// Errors   a run returns the program's exit status and has said why on stderr.
+#ifndef LW_SIMULATOR_SIMULATION_H
+#define LW_SIMULATOR_SIMULATION_H
+
+#include "program/program.h" // struct lw_program
+#include "simulator/plant.h" // struct lw_plant
+
+struct lw_simulation {
+    const struct lw_program *program;
+    struct lw_plant plant;
+    struct lw_plant_state arm;
+    int64_t last_tick; // plant periods after which the scene is done
+};
+
+// Fixed rate, own clock, real-time threads. Ends when done, or on SIGINT or SIGTERM after ramping to rest.
+int lw_simulation_live(struct lw_simulation *simulation);
+
+// Waits for the controller's answer once per controller period. Ends when done, or on SIGINT or SIGTERM.
+int lw_simulation_lockstep(struct lw_simulation *simulation);
+
+// Publishes the arm's state, or the scene's obstacles as a perception source would.
+LW_MUST_CHECK enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulation, struct lw_bus *bus);
+LW_MUST_CHECK enum lw_status lw_simulation_publish_obstacles(const struct lw_simulation *simulation,
+                                                             struct lw_bus *bus);
+
+#endif
