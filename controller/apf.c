@@ -15,8 +15,7 @@
 
 static const double goal_reached = 1e-12; // m, no direction to pull in below this
 
-void lw_apf_attraction(const struct lw_apf_params *params, const double tip[3], const double goal[3],
-                       double force[3])
+void lw_apf_attraction(const struct lw_apf_params *params, const double tip[3], const double goal[3], double force[3])
 {
     double to_goal[3];
     lw_vec_sub(goal, tip, to_goal);
@@ -38,8 +37,8 @@ double lw_apf_repulsion(const struct lw_apf_params *params, double distance)
 }
 
 // Pushes one control point away from one obstacle, and remembers the nearest pair.
-static void repel(const struct lw_apf_params *params, const struct lw_obstacle *obstacle, int point,
-                  const double x[3], struct lw_wrench *wrench, struct lw_nearest *nearest)
+static void repel(const struct lw_apf_params *params, const struct lw_obstacle *obstacle, int point, const double x[3],
+                  struct lw_wrench *wrench, struct lw_nearest *nearest)
 {
     double away[3], force[3] = {0};
     const double distance = lw_obstacle_distance(obstacle, x, away);

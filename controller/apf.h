@@ -15,8 +15,7 @@ extern const struct lw_law lw_apf_law;
 
 // Attractive force on the tip, -grad of (1) U_attr = k_a |G - p|; with cone_par proportional within r0.
 //   force  out  [3]; zero within 1e-12 m of the goal
-void lw_apf_attraction(const struct lw_apf_params *params, const double tip[3], const double goal[3],
-                       double force[3]);
+void lw_apf_attraction(const struct lw_apf_params *params, const double tip[3], const double goal[3], double force[3]);
 
 // Size of the repulsive force, -d/dd of (2) U_rep = (eta/2) (1/d - 1/rho)^gamma for d <= rho, else 0.
 //   distance  m, to the obstacle's surface; below distance_min it counts as distance_min

@@ -34,8 +34,8 @@ static double part_within(double way, double limit)
 }
 
 // Range of velocities of a joint from which its position range can still be kept.
-static void position_bounds(const struct lw_limits *limits, double period_s, const double q[LW_NJ],
-                            double low[LW_NJ], double high[LW_NJ])
+static void position_bounds(const struct lw_limits *limits, double period_s, const double q[LW_NJ], double low[LW_NJ],
+                            double high[LW_NJ])
 {
     for (int j = 0; j < LW_NJ; j++) {
         const double a = limits->acceleration[j];
@@ -105,8 +105,8 @@ unsigned lw_guard_shape(const struct lw_limits *limits, double period_s, const d
 
     // Position, then velocity: both shape the wish itself.
     for (int j = 0; j < LW_NJ; j++) {
-        low[j] = -INFINITY;
-        high[j] = INFINITY;
+        low[j] = -HUGE_VAL;
+        high[j] = HUGE_VAL;
     }
     if (q_finite)
         position_bounds(limits, period_s, q, low, high);

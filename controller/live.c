@@ -209,9 +209,9 @@ static int run_threads(struct live *live)
     }
     atomic_store(&live->rt_done, true);
     pthread_join(rx, NULL);
+    const int64_t refused = lw_bus_refused(live->rx_bus) + lw_bus_refused(live->world_bus) + live->world_refused;
     lw_program_say(program, "%lld ticks, %lld periods skipped, %lld messages refused",
-                   (long long)live->control->state.tick, (long long)atomic_load(&live->skipped),
-                   (long long)(lw_bus_refused(live->rx_bus) + lw_bus_refused(live->world_bus) + live->world_refused));
+                   (long long)live->control->state.tick, (long long)atomic_load(&live->skipped), (long long)refused);
     return ok ? lw_stop_exit_status() : EXIT_FAILURE;
 }
 
@@ -223,7 +223,8 @@ int lw_control_live(struct lw_control *control)
     lw_mailbox_init(&live.world_box, live.world_slots, sizeof live.world_slots[0]);
     lw_mailbox_init(&live.request_box, live.request_slots, sizeof live.request_slots[0]);
     int status = EXIT_FAILURE;
-    if (lw_program_open(control->program, &live.rt_bus) == LW_OK && lw_program_open(control->program, &live.rx_bus) == LW_OK &&
+    if (lw_program_open(control->program, &live.rt_bus) == LW_OK &&
+        lw_program_open(control->program, &live.rx_bus) == LW_OK &&
         lw_program_open(control->program, &live.world_bus) == LW_OK && subscribe(&live) == LW_OK)
         status = run_threads(&live);
     lw_bus_close(live.world_bus);

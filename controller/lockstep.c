@@ -25,10 +25,8 @@ struct lockstep {
 
 static void tick(struct lockstep *l, const struct lw_joint_state *joint)
 {
-    const struct lw_tick_input in = {.time_ns = joint->tick * joint->period_ns,
-                                     .joint = joint,
-                                     .world = &l->world,
-                                     .request = &l->request};
+    const struct lw_tick_input in = {
+        .time_ns = joint->tick * joint->period_ns, .joint = joint, .world = &l->world, .request = &l->request};
     lw_tick(&l->control->config, &l->control->state, &in, &l->command.joint_command);
     l->plant_session = joint->stamp.session;
     l->plant_tick = joint->tick;
@@ -53,8 +51,7 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
     if (channel == LW_CHANNEL_JOINT_STATE)
         on_joint_state(l, &message->joint_state);
     else if (channel == LW_CHANNEL_OBSTACLES && lw_world_apply(&l->world, &message->obstacles) != LW_OK)
-        lw_program_say(l->control->program, "more than %d obstacles: a message was refused",
-                       LW_WORLD_MAX);
+        lw_program_say(l->control->program, "more than %d obstacles: a message was refused", LW_WORLD_MAX);
     else if (channel == LW_CHANNEL_GOAL || channel == LW_CHANNEL_STOP)
         l->request = message->request;
 }

@@ -83,7 +83,8 @@ static void ask_law(const struct lw_controller *config, const struct lw_controll
         config->law->step(&config->params, &law_in, law);
         return;
     }
-    *law = (struct lw_law_output){.qd = {NAN, NAN, NAN, NAN, NAN, NAN}, .nearest = {.distance = -1}};
+    const double nan = (double)NAN;
+    *law = (struct lw_law_output){.qd = {nan, nan, nan, nan, nan, nan}, .nearest = {.distance = -1}};
     memset(frame, 0, LW_NJ * sizeof *frame);
 }
 

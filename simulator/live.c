@@ -138,10 +138,12 @@ static void say_mode(const struct live *live, int64_t *timeouts, bool *stopped)
     const struct lw_simulation *s = live->simulation;
     const int64_t now = atomic_load(&live->timeouts);
     if (now != *timeouts)
-        lw_program_say(s->program, "no command for %g ms at t = %.3f s: ramping to rest", s->program->scene.plant.timeout_s * 1e3,
+        lw_program_say(s->program, "no command for %g ms at t = %.3f s: ramping to rest",
+                       s->program->scene.plant.timeout_s * 1e3,
                        (double)atomic_load(&live->timeout_tick) * s->plant.period_s);
     else if (*stopped && atomic_load(&live->mode) == LW_PLANT_MOVING)
-        lw_program_say(s->program, "commands again at t = %.3f s", (double)atomic_load(&live->tick) * s->plant.period_s);
+        lw_program_say(s->program, "commands again at t = %.3f s",
+                       (double)atomic_load(&live->tick) * s->plant.period_s);
     *timeouts = now;
     *stopped = atomic_load(&live->mode) == LW_PLANT_STOPPING;
 }

@@ -18,9 +18,9 @@ static const int64_t patience_ns = 5 * LW_NS_PER_S; // for an answer, once there
 struct lockstep {
     struct lw_simulation *simulation;
     struct lw_bus *bus;
-    bool answered;         // the state published last
-    bool started;          // a first answer came
-    int64_t wanted_since;  // CLOCK_MONOTONIC when the state was published first
+    bool answered;        // the state published last
+    bool started;         // a first answer came
+    int64_t wanted_since; // CLOCK_MONOTONIC when the state was published first
 };
 
 // Takes the answer to the state published last. The first one must also have seen the scene's obstacles.

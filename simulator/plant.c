@@ -13,8 +13,7 @@
 #include <math.h>   // fmax, fmin, llround
 #include <string.h> // memcpy, memset
 
-void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const struct lw_scene *scene,
-                   int64_t session)
+void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const struct lw_scene *scene, int64_t session)
 {
     const int64_t period_ns = lw_scene_period_ns(scene->plant.rate_hz);
     *plant = (struct lw_plant){.session = session,

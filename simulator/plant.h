@@ -32,13 +32,12 @@ struct lw_plant_state {
     int64_t tick;            // periods since the first accepted command
     int64_t command_session; // controller obeyed last
     int64_t command_seq;
-    int64_t command_ns;      // when its newest command was accepted
+    int64_t command_ns; // when its newest command was accepted
 };
 
 enum lw_verdict { LW_ACCEPTED, LW_REFUSED_IDLE, LW_REFUSED_PLANT, LW_REFUSED_FOREIGN, LW_REFUSED_OLD };
 
-void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const struct lw_scene *scene,
-                   int64_t session);
+void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const struct lw_scene *scene, int64_t session);
 
 // Takes a validated command or says why not: IDLE asks for no motion, PLANT is meant for another plant, FOREIGN comes
 // from a second controller while the first one is alive, OLD is a duplicate or came late.

@@ -18,12 +18,12 @@ enum lw_robot { LW_UR5, LW_UR10, LW_ROBOT_COUNT };
 // Constant description of one robot.
 struct lw_arm {
     const char *name;
-    double a[LW_NJ];              // m, DH link lengths
-    double d[LW_NJ];              // m, DH link offsets
-    double cos_alpha[LW_NJ];      // exactly 0 or +1: alpha is 0 or +-pi/2
-    double sin_alpha[LW_NJ];      // exactly 0, +1 or -1
-    double position_max[LW_NJ];   // rad, joint range is +- this
-    double velocity_max[LW_NJ];   // rad/s
+    double a[LW_NJ];            // m, DH link lengths
+    double d[LW_NJ];            // m, DH link offsets
+    double cos_alpha[LW_NJ];    // exactly 0 or +1: alpha is 0 or +-pi/2
+    double sin_alpha[LW_NJ];    // exactly 0, +1 or -1
+    double position_max[LW_NJ]; // rad, joint range is +- this
+    double velocity_max[LW_NJ]; // rad/s
 };
 
 // Pose of a frame in the base frame.
@@ -39,8 +39,7 @@ const struct lw_arm *lw_arm_get(enum lw_robot robot);
 //   q      in   [6] rad
 //   frame  out  [6] frame[i] is frame i+1
 // Fails LW_E_NOT_FINITE. Cost: 6 sin/cos pairs, no branch on data.
-LW_MUST_CHECK enum lw_status lw_arm_fk(const struct lw_arm *arm, const double q[LW_NJ],
-                                       struct lw_pose frame[LW_NJ]);
+LW_MUST_CHECK enum lw_status lw_arm_fk(const struct lw_arm *arm, const double q[LW_NJ], struct lw_pose frame[LW_NJ]);
 
 // Geometric Jacobian [6x6] of the tip, linear rows first, base axes: column j = (z_{j-1} x (o_6 - o_{j-1}); z_{j-1}).
 //   frame     in   [6] from lw_arm_fk
@@ -51,8 +50,7 @@ void lw_arm_jacobian(const struct lw_pose frame[LW_NJ], double jacobian[36]);
 //   link      in   1..6, frame the point is fixed to
 //   point     in   [3] m, base frame
 //   jacobian  out  [18] m/rad
-void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const double point[3],
-                           double jacobian[18]);
+void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const double point[3], double jacobian[18]);
 
 // Forces on the links, summed per link: the input of lw_arm_joint_effect.
 struct lw_wrench {
@@ -66,7 +64,6 @@ void lw_wrench_add(struct lw_wrench *wrench, int link, const double point[3], co
 // Joint effect of all forces, sum of J_x^T F, by one backward recursion instead of a Jacobian a force:
 // S += S_j, M += M_j, effect_j = z_{j-1} . (M - o_{j-1} x S) for j = 6..1.
 //   effect  out  [6] N m for forces in N; rad/s where a law reads forces as velocities
-void lw_arm_joint_effect(const struct lw_pose frame[LW_NJ], const struct lw_wrench *wrench,
-                         double effect[LW_NJ]);
+void lw_arm_joint_effect(const struct lw_pose frame[LW_NJ], const struct lw_wrench *wrench, double effect[LW_NJ]);
 
 #endif

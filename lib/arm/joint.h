@@ -54,11 +54,11 @@ struct lw_joint_command {
     int64_t state_tick;
     int64_t state_mono_ns;
     enum lw_command_mode mode;
-    unsigned flags;         // set of enum lw_flag
-    double qd[LW_NJ];       // rad/s, the command
-    double qd_law[LW_NJ];   // rad/s, wish of the law before the guard
-    double q[LW_NJ];        // rad, configuration it was computed for
-    double goal[3];         // m
+    unsigned flags;          // set of enum lw_flag
+    double qd[LW_NJ];        // rad/s, the command
+    double qd_law[LW_NJ];    // rad/s, wish of the law before the guard
+    double q[LW_NJ];         // rad, configuration it was computed for
+    double goal[3];          // m
     struct lw_stamp request; // newest request obeyed (session and seq only)
     struct lw_stamp world;   // newest obstacle message taken in (session and seq only)
     int64_t world_version;

@@ -23,8 +23,7 @@ static void joint_axis(const struct lw_pose frame[LW_NJ], int joint, double axis
 }
 
 // Next frame of the chain: xn = c x + s y, yt = -s x + c y, p += d z + a xn, then the turn by alpha about xn.
-static void next_frame(const struct lw_arm *arm, int joint, double q, const struct lw_pose *from,
-                       struct lw_pose *to)
+static void next_frame(const struct lw_arm *arm, int joint, double q, const struct lw_pose *from, struct lw_pose *to)
 {
     const double c = cos(q), s = sin(q);
     const double ca = arm->cos_alpha[joint], sa = arm->sin_alpha[joint];
@@ -64,8 +63,7 @@ void lw_arm_jacobian(const struct lw_pose frame[LW_NJ], double jacobian[36])
     }
 }
 
-void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const double point[3],
-                           double jacobian[18])
+void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const double point[3], double jacobian[18])
 {
     memset(jacobian, 0, 18 * sizeof *jacobian);
     for (int j = 0; j < link; j++) {
@@ -86,8 +84,7 @@ void lw_wrench_add(struct lw_wrench *wrench, int link, const double point[3], co
     lw_vec_add_scaled(1.0, moment, wrench->moment[link - 1]);
 }
 
-void lw_arm_joint_effect(const struct lw_pose frame[LW_NJ], const struct lw_wrench *wrench,
-                         double effect[LW_NJ])
+void lw_arm_joint_effect(const struct lw_pose frame[LW_NJ], const struct lw_wrench *wrench, double effect[LW_NJ])
 {
     double force[3] = {0}, moment[3] = {0};
     for (int j = LW_NJ - 1; j >= 0; j--) {

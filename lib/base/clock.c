@@ -33,8 +33,7 @@ int64_t lw_clock_utime(void)
 
 void lw_clock_sleep_until(int64_t deadline_ns)
 {
-    const struct timespec deadline = {.tv_sec = (time_t)(deadline_ns / LW_NS_PER_S),
-                                      .tv_nsec = (long)(deadline_ns % LW_NS_PER_S)};
+    const struct timespec deadline = {.tv_sec = deadline_ns / LW_NS_PER_S, .tv_nsec = deadline_ns % LW_NS_PER_S};
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, NULL) == EINTR)
         ;
 }

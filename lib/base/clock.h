@@ -9,7 +9,7 @@
 #ifndef LW_BASE_CLOCK_H
 #define LW_BASE_CLOCK_H
 
-#include <stdint.h>  // int64_t
+#include <stdint.h> // int64_t
 
 #define LW_NS_PER_S INT64_C(1000000000)
 

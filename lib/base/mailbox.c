@@ -39,7 +39,6 @@ const void *lw_mailbox_take(struct lw_mailbox *box, bool *fresh)
     // The relaxed look is a hint only; the exchange synchronises.
     *fresh = (atomic_load_explicit(&box->middle, memory_order_relaxed) & NEW) != 0;
     if (*fresh)
-        box->read_index =
-            atomic_exchange_explicit(&box->middle, box->read_index, memory_order_acq_rel) & INDEX_MASK;
+        box->read_index = atomic_exchange_explicit(&box->middle, box->read_index, memory_order_acq_rel) & INDEX_MASK;
     return box->slots + box->read_index * box->size;
 }

@@ -16,11 +16,11 @@
 enum { LW_MAILBOX_SLOTS = 3, LW_CACHE_LINE = 64 };
 
 struct lw_mailbox {
-    unsigned char *slots;                           // LW_MAILBOX_SLOTS * size bytes
-    size_t size;                                    // bytes of one slot
-    _Alignas(LW_CACHE_LINE) atomic_uint middle;     // slot between the two sides, plus the NEW bit
-    _Alignas(LW_CACHE_LINE) unsigned write_index;   // owned by the writer
-    _Alignas(LW_CACHE_LINE) unsigned read_index;    // owned by the reader
+    unsigned char *slots;                         // LW_MAILBOX_SLOTS * size bytes
+    size_t size;                                  // bytes of one slot
+    _Alignas(LW_CACHE_LINE) atomic_uint middle;   // slot between the two sides, plus the NEW bit
+    _Alignas(LW_CACHE_LINE) unsigned write_index; // owned by the writer
+    _Alignas(LW_CACHE_LINE) unsigned read_index;  // owned by the reader
 };
 
 // Starts with nothing new; a first take returns the zeroed slot.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Periodic: a fixed-rate loop on absolute deadlines. A loop that is late skips periods and counts them; it never bursts.
+// Periodic: a fixed-rate loop on absolute deadlines. A loop that is late skips periods and counts them; it never
+// bursts.
 //
 // Units    ns.
 // Frames   none.

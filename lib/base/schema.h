@@ -28,16 +28,16 @@ enum lw_kind {
 struct lw_key {
     const char *name;
     enum lw_kind kind;
-    bool required;            // else the value that stands in the struct stays
-    size_t offset;            // from the start of the enclosing struct
-    int count;                // VECTOR, LIMITS: length; LIST: capacity
-    double min, max;          // NUMBER, INTEGER, VECTOR, LIMITS: range
-    bool above_min;           // the range excludes min
-    const char *unit;         // SI symbol, or NULL
-    const char *const *names; // CHOICE: ended by NULL
+    bool required;             // else the value that stands in the struct stays
+    size_t offset;             // from the start of the enclosing struct
+    int count;                 // VECTOR, LIMITS: length; LIST: capacity
+    double min, max;           // NUMBER, INTEGER, VECTOR, LIMITS: range
+    bool above_min;            // the range excludes min
+    const char *unit;          // SI symbol, or NULL
+    const char *const *names;  // CHOICE: ended by NULL
     const struct lw_key *keys; // SECTION, LIST: members
-    size_t stride;            // LIST: bytes of one item
-    size_t count_offset;      // LIST: where the number of items (int) is stored
+    size_t stride;             // LIST: bytes of one item
+    size_t count_offset;       // LIST: where the number of items (int) is stored
     const char *help;
 };
 

@@ -11,7 +11,7 @@
 #include "base/yaml_tree.h" // struct lw_tree, lw_tree_*
 
 #include <errno.h>  // errno
-#include <math.h>   // isfinite, INFINITY
+#include <math.h>   // isfinite, HUGE_VAL
 #include <stdarg.h> // va_list
 #include <stdlib.h> // strtod, malloc
 #include <string.h> // memcpy, strcmp
@@ -119,7 +119,7 @@ static bool read_limits(const struct lw_key *key, const struct value *v, double 
     const char *text = lw_tree_scalar(v->node);
     if (text == NULL)
         return read_vector(key, v, out);
-    double number = INFINITY;
+    double number = HUGE_VAL;
     if (strcmp(text, "off") != 0 && !read_number(key, v->node, &number))
         return false;
     for (int i = 0; i < key->count; i++)

@@ -144,8 +144,9 @@ static void describe_keys(const struct lw_key *keys, const unsigned char *in, in
             fprintf(to, "%*s    required\n", indent, "");
         }
         // Items of a list have no defaults to show: there are none until the file lists some.
+        const bool has_defaults = in != NULL && keys->kind == LW_SECTION;
         if (nested)
-            describe_keys(keys->keys, keys->kind == LW_SECTION ? in + keys->offset : NULL, indent + INDENT, to);
+            describe_keys(keys->keys, has_defaults ? in + keys->offset : NULL, indent + INDENT, to);
     }
 }
 

@@ -12,15 +12,15 @@
 #define LW_MUST_CHECK __attribute__((warn_unused_result))
 
 // One line a code: name, text for people.
-#define LW_STATUS_LIST(X)                                                                          \
-    X(LW_OK, "ok")                                                                                 \
-    X(LW_E_ARGUMENT, "argument out of range")                                                      \
-    X(LW_E_NOT_FINITE, "value is not a finite number")                                             \
-    X(LW_E_SIZE, "message has the wrong size")                                                     \
-    X(LW_E_DECODE, "message is of another type or version")                                        \
-    X(LW_E_FULL, "no room left")                                                                   \
-    X(LW_E_IO, "file or memory error")                                                             \
-    X(LW_E_SCENE, "scene refused")                                                                 \
+#define LW_STATUS_LIST(X)                                                                                              \
+    X(LW_OK, "ok")                                                                                                     \
+    X(LW_E_ARGUMENT, "argument out of range")                                                                          \
+    X(LW_E_NOT_FINITE, "value is not a finite number")                                                                 \
+    X(LW_E_SIZE, "message has the wrong size")                                                                         \
+    X(LW_E_DECODE, "message is of another type or version")                                                            \
+    X(LW_E_FULL, "no room left")                                                                                       \
+    X(LW_E_IO, "file or memory error")                                                                                 \
+    X(LW_E_SCENE, "scene refused")                                                                                     \
     X(LW_E_BUS, "bus not available")
 
 enum lw_status {

@@ -8,7 +8,7 @@
 // Errors   see yaml_tree.h.
 #include "base/yaml_tree.h"
 
-#include <stdint.h> // uintptr_t
+#include <stddef.h> // ptrdiff_t
 #include <stdio.h>  // snprintf
 #include <string.h> // strlen, strcmp
 
@@ -33,10 +33,11 @@ void lw_tree_free(struct lw_tree *tree)
     yaml_document_delete(&tree->document);
 }
 
-// libyaml's getters take a mutable document though they only read it.
+// Node by libyaml's number, from 1; yaml_document_get_node asks for a mutable document though it only reads.
 static const yaml_node_t *get_node(const struct lw_tree *tree, int index)
 {
-    return yaml_document_get_node((yaml_document_t *)(uintptr_t)&tree->document, index);
+    const ptrdiff_t count = tree->document.nodes.top - tree->document.nodes.start;
+    return index >= 1 && index <= count ? &tree->document.nodes.start[index - 1] : NULL;
 }
 
 const yaml_node_t *lw_tree_root(const struct lw_tree *tree)

@@ -16,6 +16,7 @@
 #include <errno.h>      // errno
 #include <lcm/lcm.h>    // lcm_*
 #include <stdatomic.h>  // atomic_int_fast64_t
+#include <stddef.h>     // ptrdiff_t
 #include <stdlib.h>     // calloc, getenv
 #include <string.h>     // strerrordesc_np
 #include <sys/socket.h> // socket, connect
@@ -51,12 +52,18 @@ struct lw_bus {
 // Splits udpm://ADDRESS:PORT. Returns whether the URL is of that form.
 static bool parse_url(const char *url, struct sockaddr_in *address)
 {
-    char host[64];
-    int port = 0;
-    if (sscanf(url, "udpm://%63[0-9.]:%d", host, &port) != 2 || port <= 0 || port > UINT16_MAX)
+    static const char scheme[] = "udpm://";
+    char host[INET_ADDRSTRLEN];
+    if (strncmp(url, scheme, sizeof scheme - 1) != 0)
         return false;
+    const char *start = url + sizeof scheme - 1;
+    const char *colon = strchr(start, ':');
+    if (colon == NULL || colon - start >= (ptrdiff_t)sizeof host)
+        return false;
+    snprintf(host, sizeof host, "%.*s", (int)(colon - start), start);
+    const unsigned long port = strtoul(colon + 1, NULL, 10);
     *address = (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
-    return inet_pton(AF_INET, host, &address->sin_addr) == 1;
+    return port > 0 && port <= UINT16_MAX && inet_pton(AF_INET, host, &address->sin_addr) == 1;
 }
 
 // Asks the kernel for a route before LCM does, which would print a page of its own.
@@ -191,16 +198,23 @@ enum lw_status lw_bus_publish(struct lw_bus *bus, enum lw_channel channel, union
     return lcm_publish(bus->lcm, bus->channel_name[channel], bus->buffer, size) == 0 ? LW_OK : LW_E_BUS;
 }
 
+// LCM's strings are not const though encoding only reads them.
+static char *unconst(const char *text)
+{
+    char *out;
+    memcpy((void *)&out, (const void *)&text, sizeof out);
+    return out;
+}
+
 enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scene *scene)
 {
     const struct lw_stamp stamp = make_stamp(bus, ++bus->scene_seq);
-    // LCM's strings are not const though encoding only reads them.
-    const leeway_scene_t w = {.h = {stamp.utime, stamp.mono_ns, stamp.session, stamp.seq},
-                              .program = (char *)(uintptr_t)scene->program,
-                              .build = (char *)(uintptr_t)LW_BUILD,
-                              .mode = (char *)(uintptr_t)scene->mode,
-                              .file = (char *)(uintptr_t)scene->file,
-                              .yaml = (char *)(uintptr_t)scene->yaml};
+    leeway_scene_t w = {.h = {stamp.utime, stamp.mono_ns, stamp.session, stamp.seq}};
+    w.program = unconst(scene->program);
+    w.build = unconst(LW_BUILD);
+    w.mode = unconst(scene->mode);
+    w.file = unconst(scene->file);
+    w.yaml = unconst(scene->yaml);
     char channel[CHANNEL_NAME_MAX];
     snprintf(channel, sizeof channel, "%sSCENE", bus->name);
     return leeway_scene_t_publish(bus->lcm, channel, &w) == 0 ? LW_OK : LW_E_BUS;

@@ -18,9 +18,9 @@ struct lw_bus;
 
 // How to open a bus.
 struct lw_bus_config {
-    const char *url;     // NULL = LCM_DEFAULT_URL, else the default: multicast that stays on this host
-    const char *name;    // robot's prefix of the channels JOINT_STATE, JOINT_COMMAND, GOAL, STOP, SCENE; NULL = none
-    int64_t session;     // from lw_clock_session, one per process
+    const char *url;  // NULL = LCM_DEFAULT_URL, else the default: multicast that stays on this host
+    const char *name; // robot's prefix of the channels JOINT_STATE, JOINT_COMMAND, GOAL, STOP, SCENE; NULL = none
+    int64_t session;  // from lw_clock_session, one per process
 };
 
 typedef void (*lw_bus_handler)(void *user, enum lw_channel channel, const union lw_message *message);

@@ -252,11 +252,26 @@ static enum lw_status decode_stop(const void *data, int size, union lw_message *
 
 enum { FINGERPRINT_BYTES = 8 };
 
-static int size_joint_state(void) { return leeway_joint_state_t_encoded_size(&(leeway_joint_state_t){0}); }
-static int size_joint_command(void) { return leeway_joint_command_t_encoded_size(&(leeway_joint_command_t){0}); }
-static int size_obstacles(void) { return leeway_obstacles_t_encoded_size(&(leeway_obstacles_t){0}); }
-static int size_goal(void) { return leeway_goal_t_encoded_size(&(leeway_goal_t){0}); }
-static int size_stop(void) { return leeway_stop_t_encoded_size(&(leeway_stop_t){0}); }
+static int size_joint_state(void)
+{
+    return leeway_joint_state_t_encoded_size(&(leeway_joint_state_t){0});
+}
+static int size_joint_command(void)
+{
+    return leeway_joint_command_t_encoded_size(&(leeway_joint_command_t){0});
+}
+static int size_obstacles(void)
+{
+    return leeway_obstacles_t_encoded_size(&(leeway_obstacles_t){0});
+}
+static int size_goal(void)
+{
+    return leeway_goal_t_encoded_size(&(leeway_goal_t){0});
+}
+static int size_stop(void)
+{
+    return leeway_stop_t_encoded_size(&(leeway_stop_t){0});
+}
 
 static const struct wire_row {
     const char *name;
@@ -265,8 +280,8 @@ static const struct wire_row {
     int (*encode)(void *data, const union lw_message *message);
     enum lw_status (*decode)(const void *data, int size, union lw_message *message);
 } rows[LW_CHANNEL_COUNT] = {
-    [LW_CHANNEL_JOINT_STATE] = {"JOINT_STATE", size_joint_state, __leeway_joint_state_t_get_hash,
-                                encode_joint_state, decode_joint_state},
+    [LW_CHANNEL_JOINT_STATE] = {"JOINT_STATE", size_joint_state, __leeway_joint_state_t_get_hash, encode_joint_state,
+                                decode_joint_state},
     [LW_CHANNEL_JOINT_COMMAND] = {"JOINT_COMMAND", size_joint_command, __leeway_joint_command_t_get_hash,
                                   encode_joint_command, decode_joint_command},
     [LW_CHANNEL_OBSTACLES] = {"OBSTACLES", size_obstacles, __leeway_obstacles_t_get_hash, encode_obstacles,

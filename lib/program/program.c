@@ -9,8 +9,8 @@
 #define _GNU_SOURCE // argp, open_memstream
 #include "program/program.h"
 
-#include "base/build.h" // LW_BUILD
-#include "base/clock.h" // lw_clock_session
+#include "base/build.h"  // LW_BUILD
+#include "base/clock.h"  // lw_clock_session
 #include "base/thread.h" // lw_thread_*
 
 #include <argp.h>   // argp_parse
@@ -27,26 +27,30 @@ static const struct argp_option argp_options[] = {
     {"set", 's', "KEY=VALUE", 0, "Replace a key of the scene, as in --set law.gamma=2. Repeatable.", 0},
     {"lcm-url", KEY_URL, "URL", 0, "LCM bus. Default: $LCM_DEFAULT_URL, else multicast that stays on this host.", 0},
     {"name", 'n', "NAME", 0, "Robot's name: its channels become NAME_JOINT_STATE and so on.", 0},
-    {"lockstep", 'l', NULL, 0, "Plant and controller wait for each other: as fast as possible, always the same result.", 0},
+    {"lockstep", 'l', NULL, 0, "Plant and controller wait for each other: as fast as possible, always the same result.",
+     0},
     {"quiet", 'q', NULL, 0, "Errors only.", 0},
     {"help-scene", KEY_HELP_SCENE, NULL, 0, "List every key that a scene may have.", 0},
     {0}};
+
+// NOLINTBEGIN(concurrency-mt-unsafe): argp and exit are called before any thread starts
 
 static error_t parse_option(int key, char *arg, struct argp_state *state)
 {
     struct lw_program *program = state->input;
     switch (key) {
     case 's':
-        if (program->set_count == LW_SETS_MAX)
-            argp_failure(state, EXIT_USAGE, 0, "more than %d --set", LW_SETS_MAX);
-        program->set[program->set_count++] = arg;
+        if (program->set_count < LW_SETS_MAX)
+            program->set[program->set_count++] = arg;
+        else
+            argp_error(state, "more than %d --set", LW_SETS_MAX);
         break;
     case KEY_URL: program->bus_config.url = arg; break;
     case 'n': program->bus_config.name = arg; break;
     case 'l': program->lockstep = true; break;
     case 'q': program->quiet = true; break;
     case KEY_UNTIL_DONE: program->until_done = true; break;
-    case KEY_HELP_SCENE: lw_scene_describe(stdout); exit(0); // NOLINT(concurrency-mt-unsafe): before any thread
+    case KEY_HELP_SCENE: lw_scene_describe(stdout); exit(0);
     case ARGP_KEY_ARG:
         if (program->path != NULL)
             argp_error(state, "expected one SCENE, found also %s", arg);
@@ -75,8 +79,8 @@ static char *scene_text(const struct lw_scene *scene)
 
 static void parse_command_line(struct lw_program *program, int argc, char **argv)
 {
-    const struct argp argp = {argp_options + (program->has_until_done ? 0 : 1), parse_option, "SCENE",
-                              program->summary, NULL, NULL, NULL};
+    const struct argp argp = {
+        argp_options + (program->has_until_done ? 0 : 1), parse_option, "SCENE", program->summary, NULL, NULL, NULL};
     argp_err_exit_status = EXIT_USAGE;
     argp_parse(&argp, argc, argv, 0, NULL, program);
 }
@@ -87,17 +91,22 @@ void lw_program_start(struct lw_program *program, int argc, char **argv)
     struct lw_error error;
     if (lw_scene_load(program->path, program->set, program->set_count, &program->scene, &error) != LW_OK) {
         lw_program_fail(program, "%s", error.text);
-        exit(EXIT_USAGE); // NOLINT(concurrency-mt-unsafe): before any thread
+        exit(EXIT_USAGE);
     }
     program->yaml = scene_text(&program->scene);
     if (program->yaml == NULL) {
         lw_program_fail(program, "out of memory");
-        exit(EXIT_FAILED); // NOLINT(concurrency-mt-unsafe): before any thread
+        exit(EXIT_FAILED);
     }
     program->bus_config.session = lw_clock_session();
 }
 
+// NOLINTEND(concurrency-mt-unsafe)
+
 // --- words ---
+
+static void print(const struct lw_program *program, const char *format, va_list args)
+    __attribute__((format(printf, 2, 0)));
 
 static void print(const struct lw_program *program, const char *format, va_list args)
 {

@@ -41,8 +41,7 @@ static void resolve(struct lw_scene *scene)
             scene->obstacle[i].id = i + 1;
 }
 
-static enum lw_status check_start(const struct lw_scene *scene, const struct lw_source *source,
-                                  struct lw_error *error)
+static enum lw_status check_start(const struct lw_scene *scene, const struct lw_source *source, struct lw_error *error)
 {
     for (int j = 0; j < LW_NJ; j++) {
         const double low = scene->limits.position_min[j], high = scene->limits.position_max[j];
@@ -50,14 +49,13 @@ static enum lw_status check_start(const struct lw_scene *scene, const struct lw_
             return refuse(error, source, "limits: joint %d: expected position_min < position_max, found %g and %g",
                           j + 1, low, high);
         if (scene->q0[j] < low || scene->q0[j] > high)
-            return refuse(error, source, "q0: joint %d: expected %g to %g (rad, its range), found %g", j + 1, low,
-                          high, scene->q0[j]);
+            return refuse(error, source, "q0: joint %d: expected %g to %g (rad, its range), found %g", j + 1, low, high,
+                          scene->q0[j]);
     }
     return LW_OK;
 }
 
-static enum lw_status check_rates(const struct lw_scene *scene, const struct lw_source *source,
-                                  struct lw_error *error)
+static enum lw_status check_rates(const struct lw_scene *scene, const struct lw_source *source, struct lw_error *error)
 {
     const double ratio = scene->plant.rate_hz / scene->rate_hz;
     if (ratio < 1 || fabs(ratio - round(ratio)) > 1e-9)
@@ -118,7 +116,7 @@ static char *read_file(const char *path)
     char *text = calloc(1, FILE_MAX + 1);
     const size_t length = text != NULL ? fread(text, 1, FILE_MAX + 1, file) : 0;
     const int problem = ferror(file) ? errno : length > FILE_MAX ? EFBIG : 0;
-    fclose(file);
+    (void)fclose(file); // it was only read
     if (text == NULL || problem == 0)
         return text;
     free(text);
@@ -171,7 +169,7 @@ void lw_scene_obstacles(const struct lw_scene *scene, struct lw_obstacle_change 
     *change = (struct lw_obstacle_change){.op = LW_REPLACE, .count = scene->obstacle_count};
     for (int i = 0; i < scene->obstacle_count; i++) {
         const struct lw_scene_obstacle *from = &scene->obstacle[i];
-        change->obstacle[i] = (struct lw_obstacle){
-            .id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .radius = from->radius};
+        change->obstacle[i] =
+            (struct lw_obstacle){.id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .radius = from->radius};
     }
 }

@@ -8,7 +8,7 @@
 // Errors   none.
 #include "scene/scene.h"
 
-#include <math.h>   // INFINITY
+#include <math.h>   // HUGE_VAL
 #include <stddef.h> // offsetof
 
 #define PI 3.14159265358979323846
@@ -22,11 +22,13 @@ static const char *const attraction_names[] = {"cone", "cone_par", NULL};
 #define AT(field) .offset = offsetof(struct lw_scene, field)
 #define JOINTS .kind = LW_VECTOR, .count = LW_NJ
 #define LIMITS(limit_unit) .kind = LW_LIMITS, .count = LW_NJ, POSITIVE, .unit = limit_unit
-#define POSITIVE .min = 0, .max = INFINITY, .above_min = true
+#define POSITIVE .min = 0, .max = HUGE_VAL, .above_min = true
 #define ANGLE .min = -2 * PI, .max = 2 * PI, .unit = "rad"
 #define WORKSPACE .kind = LW_VECTOR, .count = 3, .min = -100, .max = 100, .unit = "m"
 #define CHOICE(choices) .kind = LW_CHOICE, .names = (choices)
 #define RATE .kind = LW_NUMBER, .max = 10000, .unit = "Hz"
+
+// clang-format off: one key a line
 
 static const struct lw_key limit_keys[] = {
     {.name = "position_min", JOINTS, AT(limits.position_min), ANGLE, .help = "lower end of the joint ranges"},
@@ -78,6 +80,8 @@ static const struct lw_key scene_keys[] = {
      .stride = sizeof(struct lw_scene_obstacle), .count_offset = offsetof(struct lw_scene, obstacle_count),
      .help = "what the simulator's sensor reports on the bus"},
     {.name = NULL}};
+
+// clang-format on
 
 const struct lw_key *lw_scene_keys(void)
 {

@@ -27,7 +27,8 @@ extern "C" {
 
 namespace nb = nanobind;
 
-namespace {
+namespace
+{
 
 using Input = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 template <typename T> using Output = nb::ndarray<nb::numpy, T, nb::c_contig>;
@@ -161,8 +162,9 @@ NB_MODULE(_native, m)
     m.attr("BUILD") = LW_BUILD;
 
     nb::class_<Arm>(m, "Arm", "Kinematics of a robot. Frames: base frame of the arm. Source: DH table of the maker.")
-        .def("__init__", [](Arm *self, const std::string &name) { new (self) Arm(make_arm(name)); }, nb::arg("name"),
-             "An arm by name: \"ur5\" or \"ur10\".")
+        .def(
+            "__init__", [](Arm *self, const std::string &name) { new (self) Arm(make_arm(name)); }, nb::arg("name"),
+            "An arm by name: \"ur5\" or \"ur10\".")
         .def_ro("name", &Arm::name)
         .def("fk", &fk, nb::arg("q"), "Pose of the tip, (..., 6) rad -> (..., 4, 4).")
         .def("frames", &frames, nb::arg("q"), "Poses of the DH frames 1 to 6, (..., 6) rad -> (..., 6, 4, 4).")

@@ -15,7 +15,8 @@
 
 namespace nb = nanobind;
 
-namespace {
+namespace
+{
 
 template <typename T> T load(const unsigned char *at)
 {

@@ -1,0 +1,71 @@
+"""Scenes through Python: the same reader, the same messages."""
+
+import pytest
+
+import leeway
+
+
+def test_loads_from_path_and_from_text(root):
+    path = root / "scenarios" / "c3.yaml"
+    assert leeway.load_scene(path).to_dict() == leeway.load_scene(path.read_text()).to_dict()
+    assert leeway.load_scene(str(path)).to_dict()["law"]["rho_rep"] == 1.9
+
+
+def test_changed_copy_leaves_the_original(root):
+    scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
+    changed = scene.with_({"law.rho_rep": 0.1 + 0.2, "q0": [0, -1.5, 0, 0, 0, 0]})
+    assert changed.to_dict()["law"]["rho_rep"] == 0.1 + 0.2
+    assert changed.to_dict()["q0"][1] == -1.5
+    assert scene.to_dict()["law"]["rho_rep"] == 0.5
+
+
+def test_obstacles_can_be_replaced(root):
+    scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
+    balls = [{"at": [0.5, 0.5, 0.5], "radius": 0.1}, {"id": 9, "at": [1, 0, 0]}]
+    assert scene.with_({"obstacles": balls}).to_dict()["obstacles"] == [
+        {"id": 1, "at": [0.5, 0.5, 0.5], "radius": 0.1},
+        {"id": 9, "at": [1.0, 0.0, 0.0], "radius": 0.0},
+    ]
+
+
+def test_written_scene_reads_back_to_the_same_bits(root):
+    for path in sorted((root / "scenarios").glob("*.yaml")):
+        scene = leeway.load_scene(path)
+        assert leeway.load_scene(scene.to_yaml()).to_dict() == scene.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("law.gama", 2, "unknown key"),
+        ("law.rho_rep", "abc", 'expected a number > 0 (m), found "abc"'),
+        ("law.rho_rep", float("nan"), 'found "nan"'),
+        ("law.rho_rep", -1, "expected a number > 0"),
+        ("law.rho_rep", 0, "expected a number > 0"),
+        ("law.eta", 0, "expected a number > 0"),
+        ("law.k_a", 0, "expected a number > 0"),
+        ("q0", [0] * 5, "expected a list of 6 numbers"),
+        ("q0", [0, 0, 0, 0, 0, 6.3], 'found "6.3"'),
+    ],
+)
+def test_refusals_name_the_key(root, key, value, message):
+    scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
+    with pytest.raises(ValueError) as refused:
+        scene.with_({key: value})
+    assert message in str(refused.value)
+    assert key in str(refused.value)
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "scene.yaml"
+    path.write_bytes(b"\xff\xfe\x00robot")
+    with pytest.raises(ValueError, match="not a text file"):
+        leeway.load_scene(path)
+
+
+def test_simulation_is_repeatable(root):
+    scene = leeway.load_scene(root / "scenarios" / "reach.yaml")
+    first, second = leeway.simulate(scene), leeway.simulate(scene)
+    assert (first.q == second.q).all()
+    assert len(first.t) == 12 * 500 + 1
+    assert first.t[-1] == 12.0

@@ -1,0 +1,158 @@
+"""The LCM bus from Python: opening it, and messages that are repeated until the controller echoes them."""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lcm
+from leeway_lcm import leeway as wire
+
+DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
+UPSERT, REMOVE, CLEAR = wire.obstacles_t.UPSERT, wire.obstacles_t.REMOVE, wire.obstacles_t.CLEAR
+RECEIVE_BUFFER = 2 << 20
+REPEAT_S = 0.1
+PATIENCE_S = 2.0
+
+
+class BusError(Exception):
+    """The bus cannot be used; the text says what to do."""
+
+
+def resolve_url(url: str | None) -> str:
+    """Return the URL to use: the argument, else LCM_DEFAULT_URL, else this host alone.
+
+    The default asks for the largest receive buffer (up to 2 MiB) that the kernel grants.
+    """
+    chosen = url or os.environ.get("LCM_DEFAULT_URL")
+    if chosen:
+        return chosen
+    try:
+        granted = int(Path("/proc/sys/net/core/rmem_max").read_text())
+    except (OSError, ValueError):
+        return DEFAULT_URL
+    return f"{DEFAULT_URL}&recv_buf_size={min(RECEIVE_BUFFER, granted)}"
+
+
+def open_bus(url: str) -> lcm.LCM:
+    """Open a bus.
+
+    Raises
+    ------
+    BusError
+        The URL is not of the form udpm://ADDRESS:PORT, or there is no multicast route.
+    """
+    match = re.fullmatch(r"udpm://([0-9.]+):(\d+)(\?.*)?", url)
+    if match is None:
+        raise BusError(
+            f'LCM URL: expected udpm://ADDRESS:PORT?ttl=N, as in {DEFAULT_URL}, found "{url}"'
+        )
+    try:
+        # Ask the kernel for a route before LCM does, which would print a page of its own.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect((match[1], int(match[2])))
+    except (OSError, OverflowError) as error:
+        raise BusError(
+            f"no multicast route for {url} ({error}); for this host alone: sudo ip link set lo "
+            "multicast on && sudo ip route add 224.0.0.0/4 dev lo"
+        ) from error
+    try:
+        return lcm.LCM(url)
+    except RuntimeError as error:
+        raise BusError(f"LCM cannot open {url}") from error
+
+
+def header(session: int, seq: int) -> Any:
+    """Return a stamp of this process."""
+    h = wire.header_t()
+    h.utime = time.time_ns() // 1000
+    h.mono_ns = time.monotonic_ns()
+    h.session, h.seq = session, seq
+    return h
+
+
+def new_session() -> int:
+    """Return a random number > 0 that tells this process from every other."""
+    return secrets.randbelow((1 << 63) - 1) + 1
+
+
+def channel(name: str, robot: str | None) -> str:
+    """Return the channel of a robot; OBSTACLES is shared by all."""
+    return f"{robot}_{name}" if robot and name != "OBSTACLES" else name
+
+
+def send_until_echoed(
+    bus: lcm.LCM,
+    to_channel: str,
+    message: Any,
+    command_channel: str,
+    is_echo: Callable[[Any], bool],
+) -> Any:
+    """Publish a message every 0.1 s until a joint command echoes it.
+
+    Returns
+    -------
+    The command that echoed it, or None after 2 s without one.
+    """
+    found: list[Any] = []
+
+    def on_command(_: str, data: bytes) -> None:
+        try:
+            command = wire.joint_command_t.decode(data)
+        except ValueError:
+            return
+        if not found and is_echo(command):
+            found.append(command)
+
+    bus.subscribe(command_channel, on_command)
+    end = time.monotonic() + PATIENCE_S
+    while not found and time.monotonic() < end:
+        bus.publish(to_channel, message.encode())
+        again = time.monotonic() + REPEAT_S
+        while not found and (left := again - time.monotonic()) > 0:
+            bus.handle_timeout(max(1, int(left * 1000)))
+    return found[0] if found else None
+
+
+def send_goal(bus: lcm.LCM, robot: str | None, goal: tuple[float, float, float] | None) -> Any:
+    """Send GOAL (m, base frame), or STOP for None, until the controller echoes it; see `send_until_echoed`."""
+    session = new_session()
+    message = wire.stop_t() if goal is None else wire.goal_t()
+    message.h = header(session, 1)
+    if goal is not None:
+        message.p = list(goal)
+    return send_until_echoed(
+        bus,
+        channel("STOP" if goal is None else "GOAL", robot),
+        message,
+        channel("JOINT_COMMAND", robot),
+        lambda command: command.request_session == session,
+    )
+
+
+def send_obstacles(
+    bus: lcm.LCM,
+    robot: str | None,
+    op: int,
+    entries: list[tuple[int, tuple[float, float, float], float]],
+) -> Any:
+    """Send a change of the obstacles (id, centre m, radius m) until it is echoed; see `send_until_echoed`."""
+    session = new_session()
+    message = wire.obstacles_t()
+    message.h = header(session, 1)
+    message.op, message.n = op, len(entries)
+    for slot, (number, centre, radius) in zip(message.o, entries, strict=False):
+        slot.id, slot.p, slot.radius = number, list(centre), radius
+    return send_until_echoed(
+        bus,
+        "OBSTACLES",
+        message,
+        channel("JOINT_COMMAND", robot),
+        lambda command: command.world_session == session,
+    )

@@ -1,0 +1,411 @@
+"""The command line `leeway`. Commands parse, call, print; the work is done in their modules."""
+
+import functools
+import inspect
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+EXIT_FAILED, EXIT_USAGE, EXIT_LOSS, EXIT_INTERRUPTED = 1, 2, 3, 130
+
+app = typer.Typer(
+    name="leeway",
+    help="Run, record and look at UR arms that keep clear of obstacles.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+obstacle_app = typer.Typer(
+    help="Put obstacles on the bus, as a sensor would.", no_args_is_help=True
+)
+app.add_typer(obstacle_app, name="obstacle")
+
+SceneArg = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="Scene file, as scenarios/c1.yaml.")
+]
+LogArg = Annotated[Path, typer.Argument(metavar="LOG", help="LCM log, as runs/c1.lcm.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", "-s", metavar="KEY=VALUE", help="Replace a key of the scene. Repeatable."
+    ),
+]
+AtOption = Annotated[
+    tuple[float, float, float], typer.Option("--at", metavar="X Y Z", help="Centre, m, base frame.")
+]
+
+
+@dataclass(frozen=True)
+class Common:
+    """Options that every command has."""
+
+    url: Annotated[str | None, typer.Option("--lcm-url", metavar="URL", help="LCM bus.")] = None
+    name: Annotated[str | None, typer.Option("--name", "-n", help="Robot's channel prefix.")] = None
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Errors only.")] = False
+
+    @property
+    def silent(self) -> bool:
+        """No progress for people: quiet, or JSON asked for."""
+        return self.quiet or self.as_json
+
+
+def command(group: typer.Typer, name: str, example: str, **settings: Any) -> Callable[..., Any]:
+    """Register a command: its own parameters, then the common ones, handed over as `common`."""
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        own = [p for p in inspect.signature(function).parameters.values() if p.name != "common"]
+        shared = list(inspect.signature(Common).parameters.values())
+
+        @functools.wraps(function)
+        def call(**values: Any) -> None:
+            common = Common(**{p.name: values.pop(p.name) for p in shared})
+            function(common=common, **values)
+
+        call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in own + shared]
+        )
+        call.__annotations__ = {p.name: p.annotation for p in own + shared}
+        group.command(name, epilog=f"Example: {example}", **settings)(call)
+        return function
+
+    return register
+
+
+def fail(message: str, status: int = EXIT_FAILED) -> NoReturn:
+    """Print one message to stderr and end."""
+    print(f"leeway: {message}", file=sys.stderr)
+    raise typer.Exit(status)
+
+
+def _load(path: Path, sets: list[str] | None) -> Any:
+    from leeway.scene import Scene, load_scene
+
+    try:
+        scene = load_scene(path)
+        return (
+            Scene(path.read_text(encoding="utf-8"), str(path), tuple(sets or ())) if sets else scene
+        )
+    except OSError as error:
+        fail(f"{path}: cannot read the scene: {error.strerror}", EXIT_USAGE)
+    except ValueError as error:
+        fail(str(error), EXIT_USAGE)
+
+
+def _analyse(path: Path, name: str | None = None) -> Any:
+    from leeway.analysis import analyse
+    from leeway.log import LogError, read_log
+
+    try:
+        return analyse(read_log(path, name=name))
+    except LogError as error:
+        fail(str(error))
+
+
+# --- run ---
+
+
+@command(app, "run", "leeway run scenarios/c4.yaml --lockstep --set law.gamma=2 --set law.eta=20")
+def run(
+    scene: SceneArg,
+    log: Annotated[
+        Path | None, typer.Option(help="Log to write; default runs/SCENE-TIME.lcm.")
+    ] = None,
+    sets: SetOption = None,
+    lockstep: Annotated[
+        bool, typer.Option("--lockstep", help="As fast as possible, always the same.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing log.")] = False,
+    *,
+    common: Common,
+) -> None:
+    """Run a scene: lcm-logger, simulator and controller as processes, recorded and summarised."""
+    from leeway.summary import print_table
+
+    path = log or Path("runs") / f"{scene.stem}-{time.strftime('%Y%m%d-%H%M%S')}.lcm"
+    if path.exists() and not force:
+        fail(f"{path} exists: choose another --log, or --force", EXIT_USAGE)
+    wall = _run_one(scene, path, sets or [], lockstep, common)
+    analysis = _analyse(path, common.name)
+    if common.as_json:
+        print(json.dumps({**analysis.to_json(), "log": str(path), "wall_s": wall}, indent=2))
+    elif not common.quiet:
+        print_table([analysis])
+        print(f"log     {path}\nreport  leeway report {path}")
+    _exit_with_losses([analysis])
+
+
+def _run_one(path: Path, log: Path, sets: list[str], lockstep: bool, common: Common) -> float:
+    """Run one scene with a progress bar; end the program with a message when it fails."""
+    from leeway import bus, processes
+    from leeway.run import Interrupted, RunConfig, RunFailed
+    from leeway.run import run as run_scene
+    from leeway.summary import progress_bar
+
+    scene = _load(path, sets)
+    config = RunConfig(scene, path, log, sets, lockstep, common.url, common.name)
+    try:
+        with progress_bar(path.stem, scene.to_dict()["duration_s"], common.silent) as advance:
+            return run_scene(config, advance)
+    except Interrupted as error:
+        fail(f"{error}: the arm was brought to rest; log: {log}", EXIT_INTERRUPTED)
+    except RunFailed as error:
+        fail(f"{error}\n  everything else was stopped; log: {log}")
+    except (bus.BusError, processes.ProgramMissing) as error:
+        fail(str(error))
+
+
+def _exit_with_losses(analyses: list[Any]) -> None:
+    """End with status 3 when a log lacks something."""
+    lost = [a for a in analyses if a.truncated_bytes]
+    for analysis in lost:
+        print(
+            f"leeway: {analysis.path}: cut in the middle: {analysis.truncated_bytes} bytes after the "
+            "last whole event were left out",
+            file=sys.stderr,
+        )
+    if lost:
+        raise typer.Exit(EXIT_LOSS)
+
+
+# --- logs ---
+
+
+@command(app, "report", "leeway report runs/c1.lcm runs/c2.lcm -o report")
+def report(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="One log, or several to compare.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder to write; default LOG.report.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Turn logs into one self-contained HTML page with PNG twins of every picture."""
+    from leeway.summary import print_table
+
+    analyses = [_analyse(log, common.name) for log in logs]
+    page = _write_report(analyses, out or logs[0].with_suffix(".report"), common.silent)
+    if common.as_json:
+        print(json.dumps({"report": str(page), "logs": [a.to_json() for a in analyses]}, indent=2))
+    elif not common.quiet:
+        print_table(analyses)
+        print(f"report  {page}")
+    _exit_with_losses(analyses)
+
+
+def _write_report(analyses: list[Any], out: Path, quiet: bool) -> Path:
+    from leeway.report import write_report
+    from leeway.summary import status_line
+
+    try:
+        with status_line("report", quiet) as say:
+            return write_report(analyses, out, say)
+    except OSError as error:
+        fail(f"{out}: cannot write the report: {error.strerror}")
+
+
+@command(app, "info", "leeway info runs/c1.lcm")
+def info(log: LogArg, *, common: Common) -> None:
+    """Tell what a log holds: programs, scene, channels, events, the numbers of the run."""
+    from leeway.summary import print_info
+
+    analysis = _analyse(log, common.name)
+    if common.as_json:
+        print(json.dumps(analysis.to_json(), indent=2))
+    elif not common.quiet:
+        print_info(analysis)
+    _exit_with_losses([analysis])
+
+
+# --- bus ---
+
+
+def _send(what: str, send: Callable[[Any], Any], common: Common) -> None:
+    """Send a message until a controller echoes it, and say so."""
+    from leeway import bus
+
+    try:
+        command = send(bus.open_bus(bus.resolve_url(common.url)))
+    except bus.BusError as error:
+        fail(str(error))
+    if command is None:
+        fail(
+            f"{what}: sent, but no controller answered within {bus.PATIENCE_S:g} s: is leeway-controller "
+            "running on this bus (same --lcm-url, same --name)?"
+        )
+    if common.as_json:
+        print(
+            json.dumps(
+                {"done": what, "obstacles": command.obstacle_count, "deviation": command.deviation}
+            )
+        )
+    elif not common.quiet:
+        print(
+            f"{what}: the controller has it ({command.obstacle_count} obstacles, tip {command.deviation:.3f} m "
+            "from the goal)"
+        )
+
+
+@command(
+    app, "goal", "leeway goal -0.4 -0.5 0.3", context_settings={"ignore_unknown_options": True}
+)
+def goal(
+    x: Annotated[float, typer.Argument(help="m, base frame.")],
+    y: Annotated[float, typer.Argument(help="m, base frame.")],
+    z: Annotated[float, typer.Argument(help="m, base frame.")],
+    *,
+    common: Common,
+) -> None:
+    """Send the tip to another goal, now."""
+    from leeway import bus
+
+    _check_point((x, y, z))
+    _send(f"goal {x:g} {y:g} {z:g}", lambda b: bus.send_goal(b, common.name, (x, y, z)), common)
+
+
+@command(app, "stop", "leeway stop   (a later `leeway goal` sets the arm in motion again)")
+def stop(*, common: Common) -> None:
+    """Brake the arm to rest and keep it there until the next goal."""
+    from leeway import bus
+
+    _send("stop", lambda b: bus.send_goal(b, common.name, None), common)
+
+
+def _check_point(point: tuple[float, float, float]) -> None:
+    if not all(abs(v) <= 100 for v in point):
+        fail(f"expected three numbers from -100 to 100 (m), found {point}", EXIT_USAGE)
+
+
+def _put(entry: tuple[int, tuple[float, float, float], float], verb: str, common: Common) -> None:
+    """Check and send one obstacle."""
+    from leeway import bus
+
+    number, at, radius = entry
+    _check_point(at)
+    if not (0 < number < 1 << 31) or not 0 <= radius <= 100:
+        fail(
+            f"expected an id > 0 and a radius from 0 to 100 (m), found {number} and {radius:g}",
+            EXIT_USAGE,
+        )
+    what = f"obstacle {number} {verb} {at[0]:g} {at[1]:g} {at[2]:g}" + (
+        f", radius {radius:g}" if radius else ""
+    )
+    _send(what, lambda b: bus.send_obstacles(b, common.name, bus.UPSERT, [entry]), common)
+
+
+@command(obstacle_app, "add", "leeway obstacle add --at 0.4 -0.5 0.3 --radius 0.1")
+def obstacle_add(
+    at: AtOption,
+    radius: Annotated[float, typer.Option(help="m; 0 is a point.")] = 0.0,
+    number: Annotated[
+        int | None, typer.Option("--id", help="Default: a free number is drawn.")
+    ] = None,
+    *,
+    common: Common,
+) -> None:
+    """Add a point or a sphere."""
+    import secrets
+
+    chosen = number if number is not None else 1000 + secrets.randbelow(1_000_000)
+    _put((chosen, at, radius), "at", common)
+
+
+@command(obstacle_app, "move", "leeway obstacle move 7 --at 0.5 -0.5 0.3")
+def obstacle_move(
+    number: Annotated[int, typer.Argument(metavar="ID")],
+    at: AtOption,
+    radius: Annotated[float, typer.Option(help="m; 0 is a point.")] = 0.0,
+    *,
+    common: Common,
+) -> None:
+    """Put an obstacle elsewhere."""
+    _put((number, at, radius), "to", common)
+
+
+@command(obstacle_app, "remove", "leeway obstacle remove 7")
+def obstacle_remove(
+    number: Annotated[int, typer.Argument(metavar="ID", min=1)],
+    *,
+    common: Common,
+) -> None:
+    """Remove an obstacle. One that a running sensor still reports comes back with its next message."""
+    from leeway import bus
+
+    entry = (number, (0.0, 0.0, 0.0), 0.0)
+    _send(
+        f"obstacle {number} removed",
+        lambda b: bus.send_obstacles(b, common.name, bus.REMOVE, [entry]),
+        common,
+    )
+
+
+@command(obstacle_app, "clear", "leeway obstacle clear")
+def obstacle_clear(*, common: Common) -> None:
+    """Remove all obstacles of all senders. Those that a running sensor reports come back."""
+    from leeway import bus
+
+    _send(
+        "all obstacles removed", lambda b: bus.send_obstacles(b, common.name, bus.CLEAR, []), common
+    )
+
+
+# --- demo and bench ---
+
+
+@command(app, "demo", "leeway demo -o runs/demo")
+def demo(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for logs and report.")] = Path(
+        "runs/demo"
+    ),
+    lockstep: Annotated[bool, typer.Option("--lockstep", help="As fast as possible.")] = False,
+    *,
+    common: Common,
+) -> None:
+    """Run the paper's cases C1 to C4 in real time, record them, and make the report that compares them."""
+    from leeway.summary import print_table, scenario
+
+    logs = []
+    for case in ("c1", "c2", "c3", "c4"):
+        log = out / f"{case}.lcm"
+        _run_one(scenario(case), log, [], lockstep, common)
+        logs.append(log)
+    analyses = [_analyse(log, common.name) for log in logs]
+    page = _write_report(analyses, out / "report", common.silent)
+    if common.as_json:
+        print(json.dumps({"report": str(page), "logs": [a.to_json() for a in analyses]}, indent=2))
+    elif not common.quiet:
+        print_table(analyses)
+        print(f"logs    {' '.join(str(log) for log in logs)}\nreport  {page}")
+    _exit_with_losses(analyses)
+
+
+@command(app, "bench", "leeway bench --json")
+def bench(*, common: Common) -> None:
+    """Measure kinematics, a run in process and a lockstep run; with pinocchio installed, the ratio to it."""
+    from leeway.bench import measure, print_results
+    from leeway.bus import BusError
+    from leeway.summary import status_line
+
+    try:
+        with status_line("bench", common.silent) as say:
+            results = measure(common.url, say)
+    except BusError as error:
+        fail(str(error))
+    if common.as_json:
+        print(json.dumps(results, indent=2))
+    elif not common.quiet:
+        print_results(results)
+
+
+def main() -> None:
+    """Entry point."""
+    app()

@@ -1,0 +1,190 @@
+"""One run: lcm-logger, simulator and controller as processes, watched and stopped in order."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import lcm
+from leeway_lcm import leeway as wire
+
+from leeway import bus as bus_tools
+from leeway.processes import Child
+from leeway.scene import Scene
+
+POLL_MS = 50
+LOGGER_PATIENCE_S = 5.0
+START_PATIENCE_S = 15.0
+REST_PATIENCE_S = 2.0
+NEVER_MOVED = -1.0
+
+
+class RunFailed(Exception):
+    """The run ended before its scene did; the text says what happened."""
+
+
+class Interrupted(Exception):
+    """Ctrl-C, after everything was stopped in order."""
+
+
+@dataclass
+class RunConfig:
+    """What to run."""
+
+    scene: Scene
+    path: Path
+    log: Path
+    sets: list[str] = field(default_factory=list)
+    lockstep: bool = False
+    url: str | None = None
+    name: str | None = None
+
+
+class _Interrupt:
+    """Turns SIGINT and SIGTERM into a flag for the life of a run."""
+
+    def __enter__(self) -> _Interrupt:
+        self.requested = False
+        self._old = {s: signal.signal(s, self._note) for s in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def _note(self, _: int, __: FrameType | None) -> None:
+        self.requested = True
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._old.items():
+            signal.signal(number, handler)
+
+
+class _Watch:
+    """Follows the arm on the bus: time of motion and whether it moves."""
+
+    def __init__(self, bus: lcm.LCM, name: str | None) -> None:
+        self.bus = bus
+        self.motion_s = NEVER_MOVED
+        self.at_rest = True
+        subscription = bus.subscribe(bus_tools.channel("JOINT_STATE", name), self._on_state)
+        subscription.set_queue_capacity(1)
+
+    def _on_state(self, _: str, data: bytes) -> None:
+        try:
+            state: Any = wire.joint_state_t.decode(data)
+        except ValueError:
+            return
+        self.motion_s = state.tick * state.period_ns * 1e-9
+        self.at_rest = all(v == 0 for v in state.qd)
+
+    def wait(self) -> None:
+        """Handle what comes in the next moment."""
+        self.bus.handle_timeout(POLL_MS)
+
+
+def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> float:
+    """Run a scene as processes and record it.
+
+    Parameters
+    ----------
+    progress
+        Called with the time of motion, s.
+
+    Returns
+    -------
+    Wall time of the motion, s.
+
+    Raises
+    ------
+    bus.BusError
+        There is no usable bus; nothing was started.
+    RunFailed
+        A process ended early or never moved; everything else was stopped, the log is whole.
+    Interrupted
+        Ctrl-C; the arm was brought to rest, everything was stopped, the log is whole.
+    """
+    url = bus_tools.resolve_url(config.url)
+    bus = bus_tools.open_bus(url)
+    children: list[Child] = []
+    with _Interrupt() as interrupt:
+        try:
+            _start(config, url, bus, children)
+            return _watch(config, bus, children, interrupt, progress)
+        finally:
+            # Controller first: it brakes the arm. Then the plant, then the recorder that saw it all.
+            for child in reversed(children):
+                child.stop()
+
+
+def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> None:
+    """Start logger, simulator, controller; the logger records before the others begin."""
+    config.log.parent.mkdir(parents=True, exist_ok=True)
+    children.append(Child("lcm-logger", "-q", "-f", f"--lcm-url={url}", str(config.log)))
+    _wait_for_logger(children[0], bus, config.log)
+    args = [str(config.path), f"--lcm-url={url}"]
+    args += [f"--set={one}" for one in config.sets]
+    args += ["--lockstep"] if config.lockstep else []
+    args += [f"--name={config.name}"] if config.name else []
+    children.append(Child("leeway-simulator", "--until-done", *args))
+    children.append(Child("leeway-controller", *args))
+
+
+def _wait_for_logger(logger: Child, bus: lcm.LCM, log: Path) -> None:
+    """Wait until the logger has written something: LCM's own probe message, sent again and again."""
+    end = time.monotonic() + LOGGER_PATIENCE_S
+    while not (log.exists() and log.stat().st_size > 0):
+        if logger.status() is not None or time.monotonic() > end:
+            raise RunFailed(f"lcm-logger does not record to {log}: {logger.said() or 'no message'}")
+        bus.publish("LCM_SELF_TEST", b"leeway run\n\0")
+        bus.handle_timeout(POLL_MS)
+        time.sleep(POLL_MS / 1000)  # the bus has no subscription yet, so handling does not wait
+
+
+def _watch(
+    config: RunConfig,
+    bus: lcm.LCM,
+    children: list[Child],
+    interrupt: _Interrupt,
+    progress: Callable[[float], None] | None,
+) -> float:
+    """Follow the run until the simulator is done; raise when anything else happens first."""
+    watch = _Watch(bus, config.name)
+    simulator = children[1]
+    started = time.monotonic()
+    moved: float | None = None
+    while simulator.status() is None:
+        watch.wait()
+        if moved is None and watch.motion_s > 0:
+            moved = time.monotonic()
+        if progress and watch.motion_s >= 0:
+            progress(watch.motion_s)
+        if interrupt.requested:
+            raise Interrupted(f"interrupted at t = {max(watch.motion_s, 0):.3f} s")
+        _check_others(children, watch)
+        if moved is None and time.monotonic() - started > START_PATIENCE_S:
+            raise RunFailed(f"the arm did not move within {START_PATIENCE_S:g} s{_words(children)}")
+    if simulator.status() != 0:
+        raise RunFailed(
+            f"{simulator.ending()} at t = {max(watch.motion_s, 0):.3f} s{_words([simulator])}"
+        )
+    return time.monotonic() - (moved or started)
+
+
+def _check_others(children: list[Child], watch: _Watch) -> None:
+    """Raise when logger or controller has ended; a plant left alone ramps to rest first."""
+    for child in (children[0], children[2]):
+        if child.status() is None:
+            continue
+        when = max(watch.motion_s, 0)
+        end = time.monotonic() + REST_PATIENCE_S
+        while child.name == "leeway-controller" and not watch.at_rest and time.monotonic() < end:
+            watch.wait()
+        raise RunFailed(f"{child.ending()} at t = {when:.3f} s{_words([child])}")
+
+
+def _words(children: list[Child]) -> str:
+    """Return what the children said, as lines to append to a message."""
+    said = [line for child in children for line in child.said().splitlines()]
+    return "".join(f"\n  {line}" for line in said[-8:])
