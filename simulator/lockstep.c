@@ -9,10 +9,12 @@
 // Errors   see simulation.h.
 #include "simulator/simulation.h"
 
-#include "base/clock.h" // lw_clock_mono_ns
-#include "base/stop.h"  // lw_stop_signal
+#include "base/clock.h"    // lw_clock_mono_ns
+#include "base/periodic.h" // lw_periodic_*
+#include "base/stop.h"     // lw_stop_signal
 
-enum { RESEND_MS = 100 };
+// lcm-logger's queue holds 30 messages and drops what comes while it is full: at this pace it may sleep for 6 ms.
+enum { RESEND_MS = 100, MESSAGES_PER_S = 5000 };
 static const int64_t patience_ns = 5 * LW_NS_PER_S; // for an answer, once there was a first one
 
 struct lockstep {
@@ -97,10 +99,13 @@ int lw_simulation_lockstep(struct lw_simulation *simulation)
         lw_program_announce(program, lockstep.bus);
         lw_program_say(program, "waiting for leeway-controller --lockstep %s", program->path);
     }
+    const int64_t pace_ns = (lw_scene_plant_ratio(&program->scene) + 1) * LW_NS_PER_S / MESSAGES_PER_S;
+    struct lw_periodic pace = lw_periodic_start(lw_clock_mono_ns(), pace_ns);
     bool done = false;
     while (ok && !done) {
         done = simulation->arm.tick >= simulation->last_tick;
         ok = step(&lockstep);
+        (void)lw_periodic_wait(&pace);
     }
     if (ok)
         lw_program_say(program, "done, %.3f s of motion", (double)simulation->arm.tick * simulation->plant.period_s);

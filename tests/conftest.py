@@ -1,4 +1,4 @@
-"""What all Python tests share: where things are, golden data, a private network for tests that use the bus."""
+"""What all Python tests share: paths, golden data, a private network for the bus."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _map_user(uid: int, gid: int) -> None:
 
 @pytest.fixture
 def private_network(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Move this process into a network namespace of its own, lo up with multicast: a fresh, empty bus."""
+    """Move this process into a network of its own, lo with multicast: a fresh, empty bus."""
     user, group = os.geteuid(), os.getegid()
     libc = ctypes.CDLL(None, use_errno=True)
     flags = CLONE_NEWNET if user == 0 else CLONE_NEWUSER | CLONE_NEWNET

@@ -1,5 +1,7 @@
 """Scenes through Python: the same reader, the same messages."""
 
+import re
+
 import pytest
 
 import leeway
@@ -50,9 +52,8 @@ def test_written_scene_reads_back_to_the_same_bits(root):
 )
 def test_refusals_name_the_key(root, key, value, message):
     scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
-    with pytest.raises(ValueError) as refused:
+    with pytest.raises(ValueError, match=re.escape(message)) as refused:
         scene.with_({key: value})
-    assert message in str(refused.value)
     assert key in str(refused.value)
 
 

@@ -1,4 +1,4 @@
-"""Helpers of the system tests: the command line, programs by hand, and logs read with LCM's own reader."""
+"""Helpers of the system tests: the command line, programs by hand, logs by LCM's reader."""
 
 from __future__ import annotations
 

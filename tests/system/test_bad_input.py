@@ -1,4 +1,4 @@
-"""What users get wrong: one clear message on stderr, the right exit status, no traceback, nothing half-written."""
+"""What users get wrong: one clear message, the right exit status, nothing half-written."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""Measurements of `leeway bench`: medians of repeated calls, and ratios to a peer in the same run."""
+"""Measurements of `leeway bench`: repeated calls, and ratios to a peer in the same run."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _pinocchio_model(pin: Any) -> Any:
 
 
 def _against_pinocchio() -> dict[str, Any]:
-    """Compare single Python calls, alternating, one configuration each; None when it is not installed."""
+    """Compare single Python calls, alternating, one configuration each."""
     try:
         import pinocchio as pin
     except ImportError:
@@ -150,7 +150,7 @@ def _lockstep(url: str | None) -> float:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "c4.lcm"
         run(RunConfig(load_scene(path), path, log, lockstep=True, url=url))
-        stamps = read_log(log).commands["mono_ns"]
+        stamps = read_log(log).commands.mono_ns
     return float(stamps[-1] - stamps[0]) * 1e-9
 
 

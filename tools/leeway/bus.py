@@ -1,10 +1,11 @@
-"""The LCM bus from Python: opening it, and messages that are repeated until the controller echoes them."""
+"""The LCM bus from Python: opening it, and messages repeated until they are echoed."""
 
 from __future__ import annotations
 
 import os
 import re
 import secrets
+import select
 import socket
 import time
 from collections.abc import Callable
@@ -68,6 +69,16 @@ def open_bus(url: str) -> lcm.LCM:
         raise BusError(f"LCM cannot open {url}") from error
 
 
+def handle(bus: lcm.LCM, seconds: float) -> None:
+    """Wait for messages and hand one to its handler. A signal does not disturb the wait.
+
+    LCM's own timeout fails when a signal comes; Python's select goes on waiting.
+    """
+    ready, _, _ = select.select([bus.fileno()], [], [], seconds)
+    if ready:
+        bus.handle()
+
+
 def header(session: int, seq: int) -> Any:
     """Return a stamp of this process."""
     h = wire.header_t()
@@ -116,12 +127,12 @@ def send_until_echoed(
         bus.publish(to_channel, message.encode())
         again = time.monotonic() + REPEAT_S
         while not found and (left := again - time.monotonic()) > 0:
-            bus.handle_timeout(max(1, int(left * 1000)))
+            handle(bus, left)
     return found[0] if found else None
 
 
 def send_goal(bus: lcm.LCM, robot: str | None, goal: tuple[float, float, float] | None) -> Any:
-    """Send GOAL (m, base frame), or STOP for None, until the controller echoes it; see `send_until_echoed`."""
+    """Send GOAL (m, base frame), or STOP for None, as `send_until_echoed` does."""
     session = new_session()
     message = wire.stop_t() if goal is None else wire.goal_t()
     message.h = header(session, 1)
@@ -142,7 +153,7 @@ def send_obstacles(
     op: int,
     entries: list[tuple[int, tuple[float, float, float], float]],
 ) -> Any:
-    """Send a change of the obstacles (id, centre m, radius m) until it is echoed; see `send_until_echoed`."""
+    """Send a change of obstacles (id, centre m, radius m), as `send_until_echoed` does."""
     session = new_session()
     message = wire.obstacles_t()
     message.h = header(session, 1)

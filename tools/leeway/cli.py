@@ -164,14 +164,17 @@ def _run_one(path: Path, log: Path, sets: list[str], lockstep: bool, common: Com
 
 def _exit_with_losses(analyses: list[Any]) -> None:
     """End with status 3 when a log lacks something."""
-    lost = [a for a in analyses if a.truncated_bytes]
-    for analysis in lost:
-        print(
-            f"leeway: {analysis.path}: cut in the middle: {analysis.truncated_bytes} bytes after the "
-            "last whole event were left out",
-            file=sys.stderr,
-        )
-    if lost:
+    problems = []
+    for a in analyses:
+        missing = a.losses["commands_not_in_log"] + a.losses["states_not_in_log"]
+        if a.truncated_bytes:
+            cut = f"{a.truncated_bytes} bytes after the last whole event were left out"
+            problems.append(f"{a.path}: cut in the middle: {cut}")
+        if missing:
+            problems.append(f"{a.path}: {missing} messages of the motion are missing in the log")
+    for problem in problems:
+        print(f"leeway: {problem}", file=sys.stderr)
+    if problems:
         raise typer.Exit(EXIT_LOSS)
 
 
@@ -239,8 +242,8 @@ def _send(what: str, send: Callable[[Any], Any], common: Common) -> None:
         fail(str(error))
     if command is None:
         fail(
-            f"{what}: sent, but no controller answered within {bus.PATIENCE_S:g} s: is leeway-controller "
-            "running on this bus (same --lcm-url, same --name)?"
+            f"{what}: sent, but no controller answered within {bus.PATIENCE_S:g} s: "
+            "is leeway-controller running on this bus (same --lcm-url, same --name)?"
         )
     if common.as_json:
         print(
@@ -250,8 +253,8 @@ def _send(what: str, send: Callable[[Any], Any], common: Common) -> None:
         )
     elif not common.quiet:
         print(
-            f"{what}: the controller has it ({command.obstacle_count} obstacles, tip {command.deviation:.3f} m "
-            "from the goal)"
+            f"{what}: the controller has it ({command.obstacle_count} obstacles, "
+            f"tip {command.deviation:.3f} m from the goal)"
         )
 
 
@@ -337,7 +340,7 @@ def obstacle_remove(
     *,
     common: Common,
 ) -> None:
-    """Remove an obstacle. One that a running sensor still reports comes back with its next message."""
+    """Remove an obstacle. One that a sensor still reports comes back with its next message."""
     from leeway import bus
 
     entry = (number, (0.0, 0.0, 0.0), 0.0)
@@ -370,7 +373,7 @@ def demo(
     *,
     common: Common,
 ) -> None:
-    """Run the paper's cases C1 to C4 in real time, record them, and make the report that compares them."""
+    """Run the paper's cases C1 to C4 in real time, and make the report that compares them."""
     from leeway.summary import print_table, scenario
 
     logs = []
@@ -390,7 +393,7 @@ def demo(
 
 @command(app, "bench", "leeway bench --json")
 def bench(*, common: Common) -> None:
-    """Measure kinematics, a run in process and a lockstep run; with pinocchio installed, the ratio to it."""
+    """Measure kinematics and runs; with pinocchio installed, also the ratio to it."""
     from leeway.bench import measure, print_results
     from leeway.bus import BusError
     from leeway.summary import status_line

@@ -29,7 +29,7 @@ def program(name: str) -> Path:
 
 
 class Child:
-    """A running program. Its own session, so that Ctrl-C in the terminal reaches the parent alone."""
+    """A running program, in its own session: Ctrl-C in the terminal reaches the parent alone."""
 
     def __init__(self, name: str, *args: str) -> None:
         self.name = name

@@ -17,7 +17,7 @@ from leeway import bus as bus_tools
 from leeway.processes import Child
 from leeway.scene import Scene
 
-POLL_MS = 50
+POLL_S = 0.05
 LOGGER_PATIENCE_S = 5.0
 START_PATIENCE_S = 15.0
 REST_PATIENCE_S = 2.0
@@ -81,7 +81,7 @@ class _Watch:
 
     def wait(self) -> None:
         """Handle what comes in the next moment."""
-        self.bus.handle_timeout(POLL_MS)
+        bus_tools.handle(self.bus, POLL_S)
 
 
 def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> float:
@@ -113,7 +113,7 @@ def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> f
             _start(config, url, bus, children)
             return _watch(config, bus, children, interrupt, progress)
         finally:
-            # Controller first: it brakes the arm. Then the plant, then the recorder that saw it all.
+            # The controller first, which brakes the arm; then the plant; the recorder last.
             for child in reversed(children):
                 child.stop()
 
@@ -132,14 +132,13 @@ def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> 
 
 
 def _wait_for_logger(logger: Child, bus: lcm.LCM, log: Path) -> None:
-    """Wait until the logger has written something: LCM's own probe message, sent again and again."""
+    """Wait until the logger has written something: a probe, sent again and again."""
     end = time.monotonic() + LOGGER_PATIENCE_S
     while not (log.exists() and log.stat().st_size > 0):
         if logger.status() is not None or time.monotonic() > end:
             raise RunFailed(f"lcm-logger does not record to {log}: {logger.said() or 'no message'}")
         bus.publish("LCM_SELF_TEST", b"leeway run\n\0")
-        bus.handle_timeout(POLL_MS)
-        time.sleep(POLL_MS / 1000)  # the bus has no subscription yet, so handling does not wait
+        time.sleep(POLL_S)
 
 
 def _watch(
