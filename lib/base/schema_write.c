@@ -9,15 +9,22 @@
 #include "base/schema.h"
 
 #include <math.h>   // isinf
+#include <stdlib.h> // strtod
 #include <string.h> // memcpy, strlen
 
 enum { INDENT = 2 };
 
 // --- values ---
 
+// The shortest decimal that reads back to the same bits; 17 digits always do.
 static void write_number(double number, FILE *to)
 {
-    fprintf(to, "%.17g", number);
+    char text[32];
+    int digits = 6;
+    do
+        snprintf(text, sizeof text, "%.*g", digits, number);
+    while (strtod(text, NULL) != number && digits++ < 17);
+    fputs(text, to);
 }
 
 static void write_numbers(const double *numbers, int count, FILE *to)

@@ -34,26 +34,37 @@ static const struct lw_key limit_keys[] = {
     {.name = "position_min", JOINTS, AT(limits.position_min), ANGLE, .help = "lower end of the joint ranges"},
     {.name = "position_max", JOINTS, AT(limits.position_max), ANGLE, .help = "upper end of the joint ranges"},
     {.name = "velocity", LIMITS("rad/s"), AT(limits.velocity), .help = "joint speed limit of the guard"},
-    {.name = "acceleration", LIMITS("rad/s^2"), AT(limits.acceleration), .help = "joint acceleration limit of the guard"},
+    {.name = "acceleration", LIMITS("rad/s^2"), AT(limits.acceleration),
+     .help = "joint acceleration limit of the guard"},
     {.name = NULL}};
 
 static const struct lw_key plant_keys[] = {
-    {.name = "rate_hz", RATE, .min = 0, AT(plant.rate_hz), .help = "own rate of the plant, a whole multiple of the top-level rate_hz; 0 = the same"},
-    {.name = "timeout_s", .kind = LW_NUMBER, AT(plant.timeout_s), POSITIVE, .unit = "s", .help = "without a command for this long the plant ramps to rest"},
+    {.name = "rate_hz", RATE, .min = 0, AT(plant.rate_hz),
+     .help = "own rate of the plant, a whole multiple of the top-level rate_hz; 0 = the same"},
+    {.name = "timeout_s", .kind = LW_NUMBER, AT(plant.timeout_s), POSITIVE, .unit = "s",
+     .help = "without a command for this long the plant ramps to rest"},
     {.name = "velocity", LIMITS("rad/s"), AT(plant.velocity), .help = "joint speed limit of the plant"},
-    {.name = "acceleration", LIMITS("rad/s^2"), AT(plant.acceleration), .help = "joint acceleration limit of the plant"},
+    {.name = "acceleration", LIMITS("rad/s^2"), AT(plant.acceleration),
+     .help = "joint acceleration limit of the plant"},
     {.name = NULL}};
 
 static const struct lw_key law_keys[] = {
     {.name = "name", CHOICE(law_names), AT(law.name), .help = "law that moves the arm"},
-    {.name = "control_points", CHOICE(control_point_names), AT(law.apf.control_points), .help = "points that obstacles repel: joints = origins of the DH frames 1 to 6"},
-    {.name = "attraction", CHOICE(attraction_names), AT(law.apf.attraction), .help = "cone: constant pull; cone_par: proportional within r0 of the goal"},
-    {.name = "gamma", .kind = LW_INTEGER, .min = 1, .max = 2, AT(law.apf.gamma), .help = "exponent of the repulsive potential"},
-    {.name = "k_a", .kind = LW_NUMBER, AT(law.apf.k_a), POSITIVE, .unit = "rad/s per m", .help = "gain of the attraction"},
-    {.name = "r0", .kind = LW_NUMBER, AT(law.apf.r0), POSITIVE, .unit = "m", .help = "radius of the proportional zone of cone_par"},
+    {.name = "control_points", CHOICE(control_point_names), AT(law.apf.control_points),
+     .help = "points that obstacles repel: joints = origins of the DH frames 1 to 6"},
+    {.name = "attraction", CHOICE(attraction_names), AT(law.apf.attraction),
+     .help = "cone: constant pull; cone_par: proportional within r0 of the goal"},
+    {.name = "gamma", .kind = LW_INTEGER, .min = 1, .max = 2, AT(law.apf.gamma),
+     .help = "exponent of the repulsive potential"},
+    {.name = "k_a", .kind = LW_NUMBER, AT(law.apf.k_a), POSITIVE, .unit = "rad/s per m",
+     .help = "gain of the attraction"},
+    {.name = "r0", .kind = LW_NUMBER, AT(law.apf.r0), POSITIVE, .unit = "m",
+     .help = "radius of the proportional zone of cone_par"},
     {.name = "eta", .kind = LW_NUMBER, AT(law.apf.eta), POSITIVE, .help = "gain of the repulsion"},
-    {.name = "rho_rep", .kind = LW_NUMBER, AT(law.apf.rho_rep), POSITIVE, .unit = "m", .help = "reach of the repulsion from an obstacle's surface"},
-    {.name = "distance_min", .kind = LW_NUMBER, AT(law.apf.distance_min), POSITIVE, .unit = "m", .help = "smaller distances count as this, which bounds the force"},
+    {.name = "rho_rep", .kind = LW_NUMBER, AT(law.apf.rho_rep), POSITIVE, .unit = "m",
+     .help = "reach of the repulsion from an obstacle's surface"},
+    {.name = "distance_min", .kind = LW_NUMBER, AT(law.apf.distance_min), POSITIVE, .unit = "m",
+     .help = "smaller distances count as this, which bounds the force"},
     {.name = NULL}};
 
 static const struct lw_key request_keys[] = {
@@ -62,15 +73,18 @@ static const struct lw_key request_keys[] = {
 
 #define OF_OBSTACLE(field) .offset = offsetof(struct lw_scene_obstacle, field)
 static const struct lw_key obstacle_keys[] = {
-    {.name = "id", .kind = LW_INTEGER, OF_OBSTACLE(id), .min = 0, .max = 1e9, .help = "unique number; 0 or left out = place in the list, from 1"},
+    {.name = "id", .kind = LW_INTEGER, OF_OBSTACLE(id), .min = 0, .max = 1e9,
+     .help = "unique number; 0 or left out = place in the list, from 1"},
     {.name = "at", WORKSPACE, OF_OBSTACLE(at), .required = true, .help = "centre"},
-    {.name = "radius", .kind = LW_NUMBER, OF_OBSTACLE(radius), .min = 0, .max = 100, .unit = "m", .help = "0 = a point"},
+    {.name = "radius", .kind = LW_NUMBER, OF_OBSTACLE(radius), .min = 0, .max = 100, .unit = "m",
+     .help = "0 = a point"},
     {.name = NULL}};
 
 static const struct lw_key scene_keys[] = {
     {.name = "robot", CHOICE(robot_names), AT(robot), .required = true, .help = "arm"},
     {.name = "rate_hz", RATE, .min = 1, AT(rate_hz), .help = "rate of the controller"},
-    {.name = "duration_s", .kind = LW_NUMBER, AT(duration_s), .min = 0, .above_min = true, .max = 86400, .unit = "s", .help = "length of the run, counted in time of motion"},
+    {.name = "duration_s", .kind = LW_NUMBER, AT(duration_s), .min = 0, .above_min = true, .max = 86400, .unit = "s",
+     .help = "length of the run, counted in time of motion"},
     {.name = "q0", JOINTS, AT(q0), ANGLE, .required = true, .help = "joint positions at the start"},
     {.name = "limits", .kind = LW_SECTION, .keys = limit_keys, .help = "guard of the controller"},
     {.name = "plant", .kind = LW_SECTION, .keys = plant_keys, .help = "simulated arm"},
