@@ -21,7 +21,7 @@
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
-enum { POLL_MS = 50, ANNOUNCE_POLLS = 20, RT_PRIORITY = 80, RX_PRIORITY = 79 };
+enum { POLL_MS = 50, RT_PRIORITY = 80, RX_PRIORITY = 79 };
 
 // A joint state and when it came.
 struct arrival {
@@ -185,9 +185,9 @@ static enum lw_status subscribe(struct live *live)
 static bool serve(struct live *live)
 {
     bool ok = true;
-    for (int poll = 0; !atomic_load(&live->rt_done); poll++) {
-        if (poll % ANNOUNCE_POLLS == 0)
-            lw_program_announce(live->control->program, live->world_bus);
+    int64_t announce_ns = 0;
+    while (!atomic_load(&live->rt_done)) {
+        lw_program_announce(live->control->program, live->world_bus, &announce_ns);
         ok = ok && lw_bus_handle(live->world_bus, POLL_MS);
         if (lw_stop_signal() != 0 || !ok)
             atomic_store(&live->stopping, true);

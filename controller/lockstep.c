@@ -11,7 +11,7 @@
 
 #include "base/stop.h" // lw_stop_signal
 
-enum { POLL_MS = 100, ANNOUNCE_POLLS = 10 };
+enum { POLL_MS = 100 };
 
 struct lockstep {
     struct lw_control *control;
@@ -77,9 +77,9 @@ int lw_control_lockstep(struct lw_control *control)
         return 1;
     }
     lw_program_say(control->program, "ready, in lockstep");
-    for (int poll = 0; lw_stop_signal() == 0; poll++) {
-        if (poll % ANNOUNCE_POLLS == 0)
-            lw_program_announce(control->program, lockstep.bus);
+    int64_t announce_ns = 0;
+    while (lw_stop_signal() == 0) {
+        lw_program_announce(control->program, lockstep.bus, &announce_ns);
         if (!lw_bus_handle(lockstep.bus, POLL_MS)) {
             lw_program_fail(control->program, "the bus failed");
             break;

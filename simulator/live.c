@@ -20,7 +20,7 @@
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
-enum { RT_PRIORITY = 80, RX_PRIORITY = 79, POLL_MS = 50, OBSTACLE_POLLS = 2, ANNOUNCE_POLLS = 20 };
+enum { RT_PRIORITY = 80, RX_PRIORITY = 79, POLL_MS = 50, OBSTACLE_POLLS = 2 };
 
 struct live {
     struct lw_simulation *simulation;
@@ -153,11 +153,10 @@ static void serve(struct live *live)
 {
     const struct lw_program *program = live->simulation->program;
     struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), POLL_MS * INT64_C(1000000));
-    int64_t timeouts = 0;
+    int64_t timeouts = 0, announce_ns = 0;
     bool stopped = false;
     for (int poll = 0; !atomic_load(&live->rt_done); poll++) {
-        if (poll % ANNOUNCE_POLLS == 0)
-            lw_program_announce(program, live->sensor_bus);
+        lw_program_announce(program, live->sensor_bus, &announce_ns);
         if (poll % OBSTACLE_POLLS == 0 && lw_simulation_publish_obstacles(live->simulation, live->sensor_bus) != LW_OK)
             lw_program_say(program, "OBSTACLES could not be sent");
         (void)lw_periodic_wait(&loop);

@@ -95,15 +95,15 @@ int lw_simulation_lockstep(struct lw_simulation *simulation)
     if (lw_program_open(program, &lockstep.bus) != LW_OK)
         return 1;
     bool ok = lw_program_subscribe(program, lockstep.bus, LW_CHANNEL_JOINT_COMMAND, on_command, &lockstep) == LW_OK;
-    if (ok) {
-        lw_program_announce(program, lockstep.bus);
+    if (ok)
         lw_program_say(program, "waiting for leeway-controller --lockstep %s", program->path);
-    }
     const int64_t pace_ns = (lw_scene_plant_ratio(&program->scene) + 1) * LW_NS_PER_S / MESSAGES_PER_S;
     struct lw_periodic pace = lw_periodic_start(lw_clock_mono_ns(), pace_ns);
+    int64_t announce_ns = 0;
     bool done = false;
     while (ok && !done) {
         done = simulation->arm.tick >= simulation->last_tick;
+        lw_program_announce(program, lockstep.bus, &announce_ns);
         ok = step(&lockstep);
         (void)lw_periodic_wait(&pace);
     }

@@ -153,8 +153,12 @@ enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_
     return status;
 }
 
-void lw_program_announce(const struct lw_program *program, struct lw_bus *bus)
+void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, int64_t *due_ns)
 {
+    const int64_t now_ns = lw_clock_mono_ns();
+    if (now_ns < *due_ns)
+        return;
+    *due_ns = now_ns + LW_NS_PER_S;
     const struct lw_bus_scene scene = {.program = program->name,
                                        .mode = program->lockstep ? "lockstep" : "realtime",
                                        .file = program->path,

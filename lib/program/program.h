@@ -48,8 +48,9 @@ LW_MUST_CHECK enum lw_status lw_program_open(const struct lw_program *program, s
 LW_MUST_CHECK enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_bus *bus,
                                                   enum lw_channel channel, lw_bus_handler handler, void *user);
 
-// Publishes the scene in force on SCENE, for the log.
-void lw_program_announce(const struct lw_program *program, struct lw_bus *bus);
+// Publishes the scene in force on SCENE, for the log, when a second has passed since it did so last.
+//   due_ns  in/out  CLOCK_MONOTONIC of the next time; 0 = now
+void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, int64_t *due_ns);
 
 // Asks for locked memory and SCHED_FIFO for the calling thread; says so when the system refuses.
 void lw_program_go_realtime(const struct lw_program *program, int priority);

@@ -1,6 +1,8 @@
 """Scenes through Python: the same reader, the same messages."""
 
 import re
+import threading
+import time
 
 import pytest
 
@@ -70,3 +72,25 @@ def test_simulation_is_repeatable(root):
     assert (first.q == second.q).all()
     assert len(first.t) == 12 * 500 + 1
     assert first.t[-1] == 12.0
+
+
+def test_a_run_releases_the_interpreter(root):
+    scene = leeway.load_scene(root / "scenarios" / "c4.yaml").with_({"duration_s": 2000})
+    done = threading.Event()
+    number = 0
+
+    def count():
+        nonlocal number
+        while not done.is_set():
+            number += 1
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    start, before = time.perf_counter(), number
+    leeway.simulate(scene)
+    counted, took = number - before, time.perf_counter() - start
+    done.set()
+    thread.join()
+    # Were the lock held, the other thread would count for a switch interval of 5 ms at most.
+    assert took > 0.05
+    assert counted > 200_000

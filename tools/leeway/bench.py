@@ -106,20 +106,17 @@ def _against_pinocchio() -> dict[str, Any]:
     data, tip = model.createData(), model.getFrameId("tip")
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     calls = {
-        "fk": (lambda q: arm.fk(q), lambda q: pin.framesForwardKinematics(model, data, q)),
+        "fk": (arm.fk, lambda q: pin.framesForwardKinematics(model, data, q)),
         "jacobian": (
-            lambda q: arm.jacobian(q),
+            arm.jacobian,
             lambda q: pin.computeFrameJacobian(model, data, q, tip, frame),
         ),
     }
     results: dict[str, Any] = {"installed": True, "version": pin.__version__}
     for name, (ours, theirs) in calls.items():
-        ratios = [_pair(ours, theirs) for _ in range(30)]
-        results[f"{name}_call_ratio"] = {
-            "p50": statistics.median(ratios),
-            "min": min(ratios),
-            "max": max(ratios),
-        }
+        triples = [_triple(ours, theirs) for _ in range(30)]
+        results[f"{name}_c_loop_over_call"] = _spread([loop / peer for loop, _, peer in triples])
+        results[f"{name}_call_over_call"] = _spread([call / peer for _, call, peer in triples])
     q = _configurations(1)[0]
     difference = np.abs(
         arm.jacobian(q) - pin.computeFrameJacobian(model, data, q, tip, frame)
@@ -128,17 +125,23 @@ def _against_pinocchio() -> dict[str, Any]:
     return results
 
 
-def _pair(ours: Callable[[Any], object], theirs: Callable[[Any], object]) -> float:
-    """Return time of ours / time of theirs over the same configurations, one call each."""
-    batch = list(_configurations(BATCH))
+def _spread(ratios: list[float]) -> dict[str, float]:
+    return {"p50": statistics.median(ratios), "min": min(ratios), "max": max(ratios)}
 
-    def loop(call: Callable[[Any], object]) -> float:
+
+def _triple(
+    ours: Callable[[Any], object], theirs: Callable[[Any], object]
+) -> tuple[float, float, float]:
+    """Time the same configurations, s: in one batch call of ours, then call by call, both."""
+    batch = _configurations(BATCH)
+
+    def calls(function: Callable[[Any], object]) -> float:
         start = time.perf_counter()
         for q in batch:
-            call(q)
+            function(q)
         return time.perf_counter() - start
 
-    return loop(ours) / loop(theirs)
+    return _time(lambda: ours(batch), 1)[0], calls(ours), calls(theirs)
 
 
 def _lockstep(url: str | None) -> float:
@@ -172,10 +175,9 @@ def print_results(results: dict[str, Any]) -> None:
     if not peer["installed"]:
         console.print(f"pinocchio is not installed: {peer['hint']}", markup=False)
         return
+    console.print(f"ratios to pinocchio {peer['version']}, called from Python, same run:")
     for name in ("fk", "jacobian"):
-        ratio = peer[f"{name}_call_ratio"]
-        console.print(
-            f"{name}: time of ours / pinocchio {peer['version']}, one Python call each: "
-            f"{ratio['p50']:.2f} [{ratio['min']:.2f}, {ratio['max']:.2f}]",
-            markup=False,
-        )
+        for kind, text in (("c_loop", "C loop"), ("call", "Python call")):
+            ratio = peer[f"{name}_{kind}_over_call"]
+            spread = f"{ratio['p50']:.2f} [{ratio['min']:.2f}, {ratio['max']:.2f}]"
+            console.print(f"  {name}, our {text}: {spread}", markup=False, soft_wrap=True)

@@ -13,6 +13,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 EXIT_FAILED, EXIT_USAGE, EXIT_LOSS, EXIT_INTERRUPTED = 1, 2, 3, 130
+RECORD_TRIES = 3
 
 app = typer.Typer(
     name="leeway",
@@ -132,14 +133,31 @@ def run(
     path = log or Path("runs") / f"{scene.stem}-{time.strftime('%Y%m%d-%H%M%S')}.lcm"
     if path.exists() and not force:
         fail(f"{path} exists: choose another --log, or --force", EXIT_USAGE)
-    wall = _run_one(scene, path, sets or [], lockstep, common)
-    analysis = _analyse(path, common.name)
+    analysis, wall = _record(scene, path, sets or [], lockstep, common)
     if common.as_json:
         print(json.dumps({**analysis.to_json(), "log": str(path), "wall_s": wall}, indent=2))
     elif not common.quiet:
         print_table([analysis])
         print(f"log     {path}\nreport  leeway report {path}")
     _exit_with_losses([analysis])
+
+
+def _missing(analysis: Any) -> int:
+    """Count the messages of the motion that the log lacks."""
+    losses: dict[str, int] = analysis.losses
+    return losses["commands_not_in_log"] + losses["states_not_in_log"]
+
+
+def _record(
+    path: Path, log: Path, sets: list[str], lockstep: bool, common: Common
+) -> tuple[Any, float]:
+    """Run one scene and read its log; a lockstep run whose log lacks something is run again."""
+    for _ in range(RECORD_TRIES if lockstep else 1):
+        wall = _run_one(path, log, sets, lockstep, common)
+        analysis = _analyse(log, common.name)
+        if not _missing(analysis):
+            break
+    return analysis, wall
 
 
 def _run_one(path: Path, log: Path, sets: list[str], lockstep: bool, common: Common) -> float:
@@ -166,7 +184,7 @@ def _exit_with_losses(analyses: list[Any]) -> None:
     """End with status 3 when a log lacks something."""
     problems = []
     for a in analyses:
-        missing = a.losses["commands_not_in_log"] + a.losses["states_not_in_log"]
+        missing = _missing(a)
         if a.truncated_bytes:
             cut = f"{a.truncated_bytes} bytes after the last whole event were left out"
             problems.append(f"{a.path}: cut in the middle: {cut}")
@@ -376,12 +394,12 @@ def demo(
     """Run the paper's cases C1 to C4 in real time, and make the report that compares them."""
     from leeway.summary import print_table, scenario
 
-    logs = []
-    for case in ("c1", "c2", "c3", "c4"):
-        log = out / f"{case}.lcm"
-        _run_one(scenario(case), log, [], lockstep, common)
-        logs.append(log)
-    analyses = [_analyse(log, common.name) for log in logs]
+    cases = ("c1", "c2", "c3", "c4")
+    logs = [out / f"{case}.lcm" for case in cases]
+    analyses = [
+        _record(scenario(case), log, [], lockstep, common)[0]
+        for case, log in zip(cases, logs, strict=True)
+    ]
     page = _write_report(analyses, out / "report", common.silent)
     if common.as_json:
         print(json.dumps({"report": str(page), "logs": [a.to_json() for a in analyses]}, indent=2))

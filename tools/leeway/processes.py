@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import shutil
 import signal
 import subprocess
@@ -28,14 +29,26 @@ def program(name: str) -> Path:
     return path
 
 
+@functools.cache
+def _may_be_fifo() -> bool:
+    """Whether the system grants a real-time priority."""
+    trial = ["chrt", "--fifo", "1", "true"]
+    return (
+        shutil.which("chrt") is not None
+        and subprocess.run(trial, capture_output=True, check=False).returncode == 0
+    )
+
+
 class Child:
     """A running program, in its own session: Ctrl-C in the terminal reaches the parent alone."""
 
-    def __init__(self, name: str, *args: str) -> None:
+    def __init__(self, name: str, *args: str, ahead: bool = False) -> None:
+        """Start a program; `ahead` of normal processes where the system grants it."""
         self.name = name
         self.stderr = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
         # The kernel ends the child when this process dies; the real program keeps this pid.
-        guard = ["setpriv", "--pdeathsig", "TERM"] if shutil.which("setpriv") else []
+        guard = ["chrt", "--fifo", "1"] if ahead and _may_be_fifo() else []
+        guard += ["setpriv", "--pdeathsig", "TERM"] if shutil.which("setpriv") else []
         self.process = subprocess.Popen(
             [*guard, str(program(name)), *args],
             stdin=subprocess.DEVNULL,

@@ -121,8 +121,10 @@ def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> f
 def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> None:
     """Start logger, simulator, controller; the logger records before the others begin."""
     config.log.parent.mkdir(parents=True, exist_ok=True)
-    children.append(Child("lcm-logger", "-q", "-f", f"--lcm-url={url}", str(config.log)))
-    _wait_for_logger(children[0], bus, config.log)
+    # A recorder that waits for the processor loses what its short queue cannot hold.
+    logger = Child("lcm-logger", "-q", "-f", f"--lcm-url={url}", str(config.log), ahead=True)
+    children.append(logger)
+    _wait_for_logger(logger, bus, config.log)
     args = [str(config.path), f"--lcm-url={url}"]
     args += [f"--set={one}" for one in config.sets]
     args += ["--lockstep"] if config.lockstep else []
