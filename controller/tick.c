@@ -51,11 +51,15 @@ static void estimate(struct lw_controller_state *state, const struct lw_tick_inp
 
 // --- select request ---
 
+// Obeys a request once: its sender repeats it until it sees the echo, and a late repetition must not undo a newer one.
 static void select_request(struct lw_controller_state *state, const struct lw_request *request)
 {
-    const struct lw_stamp *now = &state->request.stamp, *next = &request->stamp;
-    if (next->session != 0 && (next->session != now->session || next->seq != now->seq))
-        state->request = *request;
+    struct lw_stamp *obeyed = &state->obeyed[request->kind];
+    const struct lw_stamp *next = &request->stamp;
+    if (next->session == 0 || (next->session == obeyed->session && next->seq <= obeyed->seq))
+        return;
+    state->request = *request;
+    *obeyed = *next;
 }
 
 // --- law ---

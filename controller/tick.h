@@ -29,10 +29,11 @@ struct lw_controller {
 
 // Lives from tick to tick.
 struct lw_controller_state {
-    int64_t tick;              // ticks so far
-    int64_t plant_session;     // plant being controlled, 0 = none yet
-    double velocity[LW_NJ];    // rad/s, command in force
-    struct lw_request request; // request in force
+    int64_t tick;                             // ticks so far
+    int64_t plant_session;                    // plant being controlled, 0 = none yet
+    double velocity[LW_NJ];                   // rad/s, command in force
+    struct lw_request request;                // request in force
+    struct lw_stamp obeyed[LW_REQUEST_KINDS]; // newest request obeyed, by kind: each kind is counted apart
 };
 
 struct lw_tick_input {

@@ -16,7 +16,8 @@
 #include <leeway_obstacles_t.h>
 #include <leeway_stop_t.h>
 
-#include <string.h> // memcpy
+#include <stdbool.h> // bool
+#include <string.h>  // memcpy
 
 static const double workspace = 100; // m, positions beyond this are refused
 static const double speed_max = 100; // rad/s, speeds beyond this are refused
@@ -65,6 +66,12 @@ static int encode_joint_state(void *data, const union lw_message *message)
     return leeway_joint_state_t_encode(data, 0, LW_WIRE_MAX, &w);
 }
 
+// tick * period_ns is a time of motion: not negative, and it fits.
+static bool is_time(int64_t tick, int64_t period_ns)
+{
+    return period_ns > 0 && tick >= 0 && tick <= INT64_MAX / period_ns;
+}
+
 static enum lw_status decode_joint_state(const void *data, int size, union lw_message *message)
 {
     leeway_joint_state_t w;
@@ -79,7 +86,9 @@ static enum lw_status decode_joint_state(const void *data, int size, union lw_me
     memcpy(s.q, w.q, sizeof s.q);
     memcpy(s.qd, w.qd, sizeof s.qd);
     enum lw_status status = check_stamp(&s.stamp);
-    if (status == LW_OK && (w.plant_mode < LW_PLANT_HOLD || w.plant_mode > LW_PLANT_STOPPING || w.period_ns <= 0))
+    if (status == LW_OK && (w.plant_mode < LW_PLANT_HOLD || w.plant_mode > LW_PLANT_STOPPING))
+        status = LW_E_ARGUMENT;
+    if (status == LW_OK && !is_time(w.tick, w.period_ns))
         status = LW_E_ARGUMENT;
     if (status == LW_OK)
         status = check_values(s.q, LW_NJ, speed_max);
