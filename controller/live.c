@@ -21,7 +21,7 @@
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
-enum { POLL_MS = 50, RT_PRIORITY = 80, RX_PRIORITY = 79 };
+enum { POLL_MS = 50, RT_PRIORITY = 80, RX_PRIORITY = 79, PHASE_SAMPLES = 16 };
 
 // A joint state and when it came.
 struct arrival {
@@ -100,14 +100,22 @@ static const struct arrival *take_state(struct live *live)
     return lw_mailbox_take(&live->state_box, &fresh);
 }
 
-// Waits for the first joint state. False when asked to stop before one came.
-static bool wait_for_plant(struct live *live)
+// Listens to the plant until its phase is known: the time, modulo its period, at which its messages come.
+// False when asked to stop before that.
+static bool find_phase(struct live *live, int64_t *phase_ns)
 {
     struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), live->control->config.period_ns);
-    while (take_state(live)->arrival_ns == 0) {
+    for (int heard = 0; heard < PHASE_SAMPLES;) {
         if (atomic_load(&live->stopping))
             return false;
-        lw_periodic_wait(&loop);
+        (void)lw_periodic_wait(&loop);
+        bool fresh = false;
+        const struct arrival *state = lw_mailbox_take(&live->state_box, &fresh);
+        if (!fresh)
+            continue;
+        const int64_t period_ns = state->joint.period_ns;
+        *phase_ns = heard == 0 ? state->arrival_ns : lw_periodic_phase(*phase_ns, state->arrival_ns, period_ns);
+        heard++;
     }
     return true;
 }
@@ -128,11 +136,11 @@ static void tick(struct live *live, const struct lw_periodic *loop, union lw_mes
 }
 
 // Ticks until main asks to stop and the arm was braked.
-static void control(struct live *live)
+static void control(struct live *live, int64_t phase_ns)
 {
-    const int64_t period_ns = live->control->config.period_ns;
-    // Half a period after the plant's message: both clocks are one host's, so the phase stays.
-    struct lw_periodic loop = lw_periodic_start(take_state(live)->arrival_ns + period_ns / 2, period_ns);
+    // Half a plant period after the plant's message: both clocks are one host's, so the phase stays.
+    const int64_t offset_ns = take_state(live)->joint.period_ns / 2;
+    struct lw_periodic loop = lw_periodic_start(phase_ns + offset_ns, live->control->config.period_ns);
     lw_periodic_skip(&loop, lw_clock_mono_ns());
     loop.skipped = 0;
     int64_t exec_ns = 0;
@@ -157,8 +165,9 @@ static void *rt_main(void *user)
     struct live *live = user;
     lw_thread_prefault_stack();
     (void)lw_thread_set_priority(RT_PRIORITY); // main has already said when the system refuses
-    if (wait_for_plant(live))
-        control(live);
+    int64_t phase_ns = 0;
+    if (find_phase(live, &phase_ns))
+        control(live, phase_ns);
     atomic_store(&live->rt_done, true);
     return NULL;
 }

@@ -58,7 +58,11 @@ static void select_request(struct lw_controller_state *state, const struct lw_re
     const struct lw_stamp *next = &request->stamp;
     if (next->session == 0 || (next->session == obeyed->session && next->seq <= obeyed->seq))
         return;
+    // A stop has no goal of its own: the arm still knows where it was going.
+    const struct lw_request before = state->request;
     state->request = *request;
+    if (request->kind == LW_REQUEST_STOP)
+        memcpy(state->request.goal, before.goal, sizeof before.goal);
     *obeyed = *next;
 }
 

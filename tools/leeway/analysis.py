@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from leeway import _native
 from leeway.events import Event, list_events
 from leeway.limits import LimitUse, limit_uses
-from leeway.log import Commands, Floats, Ints, Log, LogError, SceneMessage, States
-from leeway.motion import Motion, select_motion
+from leeway.log import Commands, Floats, Ints, Log, LogError, SceneMessage
+from leeway.motion import select_motion
 from leeway.world import WorldLine, follow, nearest
 
 FLAGS = {
@@ -135,9 +135,14 @@ class Analysis:
         """Percentiles in us of wake lateness, execution and state age; empty in lockstep."""
         if self.mode == "lockstep":
             return {}
-        columns = {"wake_late_us": self.wake_us, "exec_us": self.exec_us, "state_age_us": self.age_us}
+        columns = {
+            "wake_late_us": self.wake_us,
+            "exec_us": self.exec_us,
+            "state_age_us": self.age_us,
+        }
         return {name: percentiles(values) for name, values in columns.items() if len(values)}
 
+    @np.errstate(over="ignore", invalid="ignore")
     def to_json(self) -> dict[str, Any]:
         """Return every number as plain values: no arrays, null for what is off or missing."""
         numbers = {
@@ -175,6 +180,7 @@ class Analysis:
         return plain
 
 
+@np.errstate(over="ignore", invalid="ignore")  # damaged numbers come out as infinite or NaN
 def analyse(log: Log) -> Analysis:
     """Turn a log into numbers.
 
@@ -191,6 +197,8 @@ def analyse(log: Log) -> Analysis:
     scene = _read_scene(log, scene_message)
     commands, states = motion.commands, motion.states
     points = _control_points(scene["robot"], commands.q)
+    if not np.isfinite(points).any():
+        raise LogError(f"{log.path}: no joint position in its commands is a number")
     goal = _goal_in_force(commands, scene["request"]["goal"])
     line = follow(log.obstacles, commands)
     distances, obstacle = nearest(points, line)
@@ -242,8 +250,9 @@ def analyse(log: Log) -> Analysis:
 
 def percentiles(values: Floats) -> dict[str, float]:
     """Return p50, p99, p99_9 and max; each is a value that occurred."""
-    found = np.percentile(values, list(PERCENTILES.values()), method="inverted_cdf")
-    return dict(zip(PERCENTILES, (float(v) for v in found), strict=True))
+    ordered = np.sort(values)
+    ranks = [math.ceil(p / 100 * len(ordered) - 1e-9) for p in PERCENTILES.values()]
+    return {name: float(ordered[rank - 1]) for name, rank in zip(PERCENTILES, ranks, strict=True)}
 
 
 def _scene_message(log: Log, commands: Commands) -> SceneMessage:
@@ -261,7 +270,9 @@ def _read_scene(log: Log, message: SceneMessage) -> dict[str, Any]:
     try:
         scene: dict[str, Any] = _native.read_scene(message.yaml, message.file, []).to_dict()
     except ValueError as error:
-        raise LogError(f"{log.path}: the scene in it, of {message.build!r}, is refused: {error}") from error
+        raise LogError(
+            f"{log.path}: the scene in it, of {message.build!r}, is refused: {error}"
+        ) from error
     return scene
 
 
@@ -292,10 +303,12 @@ def _smallest(t: Floats, distances: Floats, obstacle: Ints) -> Nearest:
 
 
 def _compare(distances: Floats, reported: Floats) -> float:
-    """Return the largest difference to the controller's own smallest distance, m; NaN = none to compare."""
+    """Return the largest difference to the controller's own smallest distance, m; NaN = none."""
     moving = distances[:, MOVING_POINTS]
     both = np.isfinite(moving).all(axis=1) & (reported != -1)
-    return float(np.abs(moving[both].min(axis=1) - reported[both]).max()) if both.any() else math.nan
+    return (
+        float(np.abs(moving[both].min(axis=1) - reported[both]).max()) if both.any() else math.nan
+    )
 
 
 def _largest(values: Floats) -> float:

@@ -69,12 +69,14 @@ def limit_uses(scene: dict[str, Any], motion: Motion) -> list[LimitUse]:
     t, plant_t = motion.t, motion.plant_t
     low, high = np.array(guard["position_min"]), np.array(guard["position_max"])
     from_middle = np.abs(motion.states.q - (low + high) / 2)
-    step = command_acceleration(motion.commands, motion.states, motion.period)
+    step = command_acceleration(motion.commands, motion.heard, motion.period)
     return [
         _use(("limits.position", "joint range", "rad"), (high - low) / 2, plant_t, from_middle),
-        _use(("limits.velocity", "commanded speed", "rad/s"), guard["velocity"], t, motion.commands.qd),
-        _use(("limits.acceleration", "commanded acceleration", "rad/s^2"), guard["acceleration"], t, step),
-        _use(("plant.velocity", "plant speed", "rad/s"), plant["velocity"], plant_t, motion.states.qd),
+        _use(("limits.velocity", "speed", "rad/s"), guard["velocity"], t, motion.commands.qd),
+        _use(("limits.acceleration", "acceleration", "rad/s^2"), guard["acceleration"], t, step),
+        _use(
+            ("plant.velocity", "plant speed", "rad/s"), plant["velocity"], plant_t, motion.states.qd
+        ),
         _use(
             ("plant.acceleration", "plant acceleration", "rad/s^2"),
             plant["acceleration"],

@@ -21,7 +21,8 @@ class Motion:
     """Commands from the first that was accepted to the last that answers a new state."""
 
     commands: Commands  # n ticks of one controller session, in its order
-    states: States  # m states of one plant session from the start of motion on
+    states: States  # m states of one plant session from the start of motion on, one a plant tick
+    heard: States  # all states of that session, also those before the motion
     t: Floats  # (n,) s
     plant_t: Floats  # (m,) s
     plant_qdd: Floats  # (m, 6) rad/s^2
@@ -41,7 +42,7 @@ class Motion:
         return int(self.states.session[0])
 
     def time_of(self, mono_ns: int) -> float:
-        """Return the time of motion (s) of a moment of this host's clock; beyond the ends by that clock."""
+        """Return the time of motion, s, of a moment of this host's clock."""
         at = self.commands.mono_ns
         inside = float(np.interp(mono_ns, at, self.t))
         outside = min(mono_ns - int(at[0]), 0) + max(mono_ns - int(at[-1]), 0)
@@ -66,15 +67,17 @@ def select_motion(log: Log) -> Motion:
     end = int(new[-1]) + 2 if len(new) else 1
     after = len(commands) - end
     commands = commands.take(np.arange(end))
-    plant_period = float(all_states.period_ns[0]) * 1e-9
+    period_ns = int(all_states.period_ns[0])
+    plant_period = period_ns / 1e9
     states = all_states.take(_moving_part(all_states, int(commands.state_tick[0])))
     ratio = max(1, int(np.median(np.diff(commands.state_tick)))) if end > 1 else 1
     losses = _losses(commands, all_states, ratio) | {"commands_sent_again": resent}
     return Motion(
         commands=commands,
         states=states,
-        t=commands.state_tick * plant_period,
-        plant_t=states.tick * plant_period,
+        heard=all_states,
+        t=commands.state_tick * period_ns / 1e9,
+        plant_t=states.tick * period_ns / 1e9,
         plant_qdd=_acceleration(states, plant_period),
         period=ratio * plant_period,
         plant_period=plant_period,
@@ -90,7 +93,7 @@ def sessions_of(messages: Messages) -> list[int]:
 
 
 def _sessions(log: Log) -> tuple[int, int]:
-    """Return the sessions of the newest plant that moved and of the newest controller that moved it."""
+    """Return the newest plant session that moved and the newest controller that moved it."""
     for plant in reversed(sessions_of(log.states)):
         states = log.states.take((log.states.session == plant) & (log.states.plant_mode != HOLD))
         obeyed = log.commands.take(
@@ -101,8 +104,8 @@ def _sessions(log: Log) -> tuple[int, int]:
         if len(states) and len(obeyed) and states.period_ns.min() > 0:
             return plant, sessions_of(obeyed)[-1]
     raise LogError(
-        f"{log.path}: the arm never moved: no plant in it obeyed a command. The controller waits for "
-        "JOINT_STATE and for one OBSTACLES message"
+        f"{log.path}: the arm never moved: no plant in it obeyed a command. A "
+        "controller waits for JOINT_STATE and for one OBSTACLES message"
     )
 
 
@@ -112,7 +115,7 @@ def _in_order(messages: MessagesT) -> MessagesT:
 
 
 def _of_motion(sent: Commands, states: States, controller: int) -> tuple[Commands, int]:
-    """Return the commands from the first accepted one on, one a tick, and how many were sent again."""
+    """Return the commands from the first accepted one on, one a tick; count those sent again."""
     accepted = states.command_seq[states.command_session == controller]
     first = int(accepted.min())
     plant = sent.plant_session == states.session[0]
@@ -133,7 +136,7 @@ def _moving_part(states: States, first_tick: int) -> NDArray[np.bool_]:
 
 
 def _acceleration(states: States, period: float) -> Floats:
-    """Return the change of qd over each plant period, (m, 6); over a gap its mean, 0 for the first."""
+    """Return the change of qd over each plant period, (m, 6); its mean over a gap, first 0."""
     out = np.zeros_like(states.qd)
     steps = np.maximum(np.diff(states.tick), 1)[:, None]
     out[1:] = np.diff(states.qd, axis=0) / (steps * period)

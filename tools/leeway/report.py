@@ -1,4 +1,4 @@
-"""One HTML page about one or several runs: self-contained, opens from disk, asks no host for anything.
+"""One HTML page about one or several runs: self-contained, opens from disk, asks no host.
 
 Beside the page lies a PNG twin of every picture.
 """
@@ -49,6 +49,7 @@ class Section:
     view: dict[str, Any]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # damaged numbers are drawn as gaps
 def write_report(
     analyses: Sequence[Analysis], out_dir: Path, progress: Callable[[str], None] | None = None
 ) -> Path:
@@ -83,7 +84,8 @@ def write_report(
     runs = list(zip(_labels(analyses), analyses, strict=True))
     slugs = _slugs([label for label, _ in runs])
     sections = [
-        _section(label, slug, a, _Writer(out_dir, slug, say)) for (label, a), slug in zip(runs, slugs, strict=True)
+        _section(label, slug, a, _Writer(out_dir, slug, say))
+        for (label, a), slug in zip(runs, slugs, strict=True)
     ]
     comparison = _comparison(runs, _Writer(out_dir, "compare", say)) if len(runs) > 1 else {}
     say("page")
@@ -107,6 +109,7 @@ class _Writer:
         self.say(f"{self.slug} {name}")
         file = f"{self.slug}_{name}.png"
         figure.savefig(self.folder / file, dpi=PNG_DPI)
+        figure.set_layout_engine("none")  # it stays as laid out: the second drawing is faster
         buffer = io.BytesIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None})
         url = "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
@@ -116,24 +119,38 @@ class _Writer:
 def _section(label: str, slug: str, a: Analysis, write: _Writer) -> Section:
     final = f"{a.final_deviation:.4f} m"
     pictures = {
-        "pose": write("pose", f"{label}: the arm from start to end, goal, obstacles", pose.scene_picture(a)),
+        "pose": write(
+            "pose", f"{label}: the arm from start to end, goal, obstacles", pose.scene_picture(a)
+        ),
         "q": write("q", f"{label}: joint positions over time", figures.joint_positions(a)),
         "qd": write("qd", f"{label}: commanded joint speeds over time", figures.joint_speeds(a)),
-        "deviation": write("deviation", f"{label}: deviation over time, {final} at the end", figures.deviation(a)),
-        "distance": write("distance", f"{label}: distance to obstacles over time", figures.distances(a)),
-        "limits": write("limits", f"{label}: share of the limits used over time", figures.limit_use(a)),
+        "deviation": write(
+            "deviation", f"{label}: deviation over time, {final} at the end", figures.deviation(a)
+        ),
+        "distance": write(
+            "distance", f"{label}: distance to obstacles over time", figures.distances(a)
+        ),
+        "limits": write(
+            "limits", f"{label}: share of the limits used over time", figures.limit_use(a)
+        ),
     }
     timing = figures.timing(a)
     if timing is not None:
-        pictures["timing"] = write("timing", f"{label}: histograms of wake lateness and execution", timing)
+        pictures["timing"] = write(
+            "timing", f"{label}: histograms of wake lateness and execution", timing
+        )
     marked = {number for number, _ in figures.marked_events(a)}
     return Section(label, slug, a, marked, pictures, list(_flat(a.scene)), view_data(a))
 
 
 def _comparison(runs: list[tuple[str, Analysis]], write: _Writer) -> dict[str, Picture]:
     return {
-        "deviation": write("deviation", "deviation over time of all runs", figures.compare(runs, "deviation")),
-        "distance": write("distance", "smallest distance over time of all runs", figures.compare(runs, "distance")),
+        "deviation": write(
+            "deviation", "deviation over time of all runs", figures.compare(runs, "deviation")
+        ),
+        "distance": write(
+            "distance", "smallest distance over time of all runs", figures.compare(runs, "distance")
+        ),
         "tip": write("tip", "paths of the tip of all runs", pose.compare_paths(runs)),
     }
 
@@ -194,7 +211,7 @@ def _text(value: Any) -> str:
 
 
 def _labels(analyses: Sequence[Analysis]) -> list[str]:
-    """Return names of the runs that tell them apart: scene, else with mode, else with the log's name."""
+    """Return names that tell the runs apart: scene, else with mode, else with the log's name."""
     for name in (
         lambda a: a.label,
         lambda a: f"{a.label} ({a.mode})",
@@ -212,7 +229,9 @@ def _slugs(labels: list[str]) -> list[str]:
     slugs = []
     for label in labels:
         base = re.sub(r"[^A-Za-z0-9]+", "-", label).strip("-").lower() or "run"
-        slug = next(s for s in (base, *(f"{base}-{k}" for k in range(2, len(labels) + 3))) if s not in taken)
+        slug = next(
+            s for s in (base, *(f"{base}-{k}" for k in range(2, len(labels) + 3))) if s not in taken
+        )
         taken.add(slug)
         slugs.append(slug)
     return slugs
@@ -231,9 +250,12 @@ def _render(sections: list[Section], comparison: dict[str, Picture]) -> str:
     title = "Leeway: " + ", ".join(section.label for section in sections)
     views = {section.slug: section.view for section in sections}
     return environment.get_template("report.html.j2").render(
-        title=title, sections=sections, comparison=comparison, views=json.dumps(views, separators=(",", ":"))
+        title=title,
+        sections=sections,
+        comparison=comparison,
+        views=json.dumps(views, separators=(",", ":")),
     )
 
 
-def _number(value: float, digits: int = 4, missing: str = "–") -> str:
+def _number(value: float, digits: int = 4, missing: str = "\N{EN DASH}") -> str:
     return f"{value:.{digits}f}" if np.isfinite(value) else missing

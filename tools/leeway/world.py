@@ -66,7 +66,9 @@ def follow(messages: Obstacles, commands: Commands) -> WorldLine:
     index = np.zeros(len(commands), dtype=np.int64)
     unknown = 0
     for start, end in zip(starts, ends, strict=True):
-        seen = _newest(history.get((int(keys[0, start]), int(keys[1, start])), []), int(commands.order[start]))
+        seen = _newest(
+            history.get((int(keys[0, start]), int(keys[1, start])), []), int(commands.order[start])
+        )
         if seen is None:
             unknown += int(end - start)
         elif seen != worlds[-1]:
@@ -136,9 +138,7 @@ def _apply(world: dict[int, Obstacle], messages: Obstacles, row: int) -> dict[in
         return {}
     if op == REMOVE:
         return {i: o for i, o in world.items() if i not in listed}
-    kept = {
-        i: o for i, o in world.items() if op == UPSERT or o.session != session or i in listed
-    }
+    kept = {i: o for i, o in world.items() if op == UPSERT or o.session != session or i in listed}
     after = kept | {o.id: o for o in entries}
     return after if len(after) <= WORLD_MAX else None
 
@@ -153,10 +153,14 @@ def _entries(messages: Obstacles, row: int) -> list[Obstacle] | None:
         x, y, z = (float(v) for v in messages.p[row, i])
         radius = float(messages.radius[row, i])
         values = (x, y, z, radius)
-        in_range = remove or (all(math.isfinite(v) and abs(v) <= POSITION_MAX for v in values) and radius >= 0)
+        in_range = remove or (
+            all(math.isfinite(v) and abs(v) <= POSITION_MAX for v in values) and radius >= 0
+        )
         if messages.id[row, i] <= 0 or not in_range:
             return None
-        entries.append(Obstacle(int(messages.id[row, i]), (x, y, z), radius, int(messages.session[row])))
+        entries.append(
+            Obstacle(int(messages.id[row, i]), (x, y, z), radius, int(messages.session[row]))
+        )
     return entries if len({o.id for o in entries}) == count else None
 
 

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The real-time path allocates nothing. This program defines the allocator's functions itself, over glibc's, and counts
+// every call of the process, of shared libraries too. First it proves that the count works.
+//
+// Units    none.
+// Frames   base frame.
+// Arrays   none.
+// Memory   counted.
+// Errors   cmocka's. Sanitizers bring allocators of their own: there the program ends with 77, skipped.
+#include "controller/tick.h"
+#include "helpers.h"
+#include "simulator/plant.h"
+#include "wire_messages.h" // make
+
+#include <errno.h>     // ENOMEM
+#include <stdatomic.h> // atomic_llong
+
+#ifdef __has_feature
+#define HAS(feature) __has_feature(feature)
+#else
+#define HAS(feature) 0
+#endif
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || HAS(address_sanitizer) || HAS(thread_sanitizer)
+
+int main(void)
+{
+    return 77;
+}
+
+#else
+
+// --- the counting allocator: the C library's names and prototypes, so its naming too ---
+// NOLINTBEGIN(bugprone-reserved-identifier,misc-use-internal-linkage,readability-*)
+
+static atomic_llong calls;
+
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t count, size_t size);
+void *__libc_realloc(void *old, size_t size);
+void *__libc_memalign(size_t alignment, size_t size);
+void __libc_free(void *old);
+void *memalign(size_t alignment, size_t size);
+int posix_memalign(void **out, size_t alignment, size_t size);
+
+void *malloc(size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_calloc(count, size);
+}
+
+void *realloc(void *old, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_realloc(old, size);
+}
+
+void free(void *old)
+{
+    atomic_fetch_add(&calls, 1);
+    __libc_free(old);
+}
+
+void *memalign(size_t alignment, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_memalign(alignment, size);
+}
+
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    return memalign(alignment, size);
+}
+
+int posix_memalign(void **out, size_t alignment, size_t size)
+{
+    void *made = memalign(alignment, size);
+    if (made != NULL)
+        *out = made;
+    return made != NULL ? 0 : ENOMEM;
+}
+
+// NOLINTEND(bugprone-reserved-identifier,misc-use-internal-linkage,readability-*)
+
+// --- proof that the count works ---
+
+// Each function is counted, from here and from inside a shared library.
+static void the_count_sees_every_call(void **state)
+{
+    (void)state;
+    const long long before = atomic_load(&calls);
+    void *volatile block = malloc(1);
+    assert_int_equal(atomic_load(&calls), before + 1);
+    void *volatile larger = realloc(block, 2);
+    assert_int_equal(atomic_load(&calls), before + 2);
+    free(larger);
+    assert_int_equal(atomic_load(&calls), before + 3);
+    block = calloc(1, 1);
+    free(block);
+    assert_int_equal(atomic_load(&calls), before + 5);
+    block = aligned_alloc(64, 64);
+    free(block);
+    assert_int_equal(atomic_load(&calls), before + 7);
+    void *aligned = NULL;
+    assert_int_equal(posix_memalign(&aligned, 64, 64), 0);
+    free(aligned);
+    assert_int_equal(atomic_load(&calls), before + 9);
+    FILE *stream = tmpfile(); // a library that allocates for itself
+    assert_true(atomic_load(&calls) > before + 9);
+    assert_true(stream != NULL && fclose(stream) == 0);
+}
+
+// --- the real-time path ---
+
+struct rig {
+    struct lw_scene scene;
+    struct lw_controller config;
+    struct lw_controller_state state;
+    struct lw_plant plant;
+    struct lw_plant_state arm;
+    struct lw_world world;
+    struct lw_request request;
+};
+
+// One period of the live programs without their sockets: state over the wire, tick, command over the wire, plant.
+static enum lw_status one_period(struct rig *rig, int64_t seq)
+{
+    unsigned char data[LW_WIRE_MAX];
+    union lw_message m, heard;
+    lw_plant_report(&rig->plant, &rig->arm, &m.joint_state);
+    m.stamp.seq = seq;
+    const uint32_t state_size = lw_wire_encode(LW_CHANNEL_JOINT_STATE, &m, data);
+    enum lw_status status = lw_wire_decode(LW_CHANNEL_JOINT_STATE, data, state_size, &heard);
+    const struct lw_tick_input in = {.joint = &heard.joint_state, .world = &rig->world, .request = &rig->request};
+    lw_tick(&rig->config, &rig->state, &in, &m.joint_command);
+    m.stamp = (struct lw_stamp){.session = 2, .seq = seq};
+    const uint32_t size = lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &m, data);
+    if (status == LW_OK)
+        status = lw_wire_decode(LW_CHANNEL_JOINT_COMMAND, data, size, &heard);
+    (void)lw_plant_accept(&rig->plant, &rig->arm, &heard.joint_command, seq);
+    lw_plant_step(&rig->plant, &rig->arm, seq);
+    return status;
+}
+
+static void tick_plant_and_wire_allocate_nothing(void **state)
+{
+    (void)state;
+    static struct rig rig;
+    rig.scene = lw_scene_defaults(LW_UR5);
+    rig.scene.plant.rate_hz = rig.scene.rate_hz;
+    assert_int_equal(lw_controller_init(&rig.config, &rig.state, &rig.scene), LW_OK);
+    lw_plant_init(&rig.plant, &rig.arm, &rig.scene, 1);
+    rig.world = (struct lw_world){.version = 1, .count = 3};
+    for (int i = 0; i < 3; i++)
+        rig.world.obstacle[i] = (struct lw_obstacle){.id = 1 + i, .p = {0.3 * i - 0.5, -0.6, 0.3}, .radius = 0.05};
+    int refused = 0;
+    const long long before = atomic_load(&calls);
+    for (int64_t seq = 1; seq <= 100000; seq++) {
+        rig.request = (struct lw_request){.stamp = {.session = 9, .seq = seq / 1000},
+                                          .goal = {0.4, 0.1, 0.0001 * (double)(seq % 5000)}};
+        refused += one_period(&rig, seq) != LW_OK;
+    }
+    assert_int_equal(atomic_load(&calls), before);
+    assert_int_equal(refused, 0);
+    assert_int_equal(rig.arm.tick, 100000); // it did run
+}
+
+// Encoding, decoding and merging every kind of message, valid or damaged.
+static void every_channel_allocates_nothing(void **state)
+{
+    (void)state;
+    struct random random = {101};
+    static struct lw_world world;
+    int taken = 0, refused = 0;
+    const long long before = atomic_load(&calls);
+    for (int n = 0; n < 100000; n++) {
+        const enum lw_channel channel = (enum lw_channel)(n % LW_CHANNEL_COUNT);
+        const union lw_message m = make(&random, channel);
+        unsigned char data[LW_WIRE_MAX];
+        union lw_message out;
+        const uint32_t size = lw_wire_encode(channel, &m, data);
+        if (n % 3 == 0)
+            data[random_below(&random, (int)size)] ^= 0x55;
+        const bool ok = lw_wire_decode(channel, data, size, &out) == LW_OK;
+        if (ok && channel == LW_CHANNEL_OBSTACLES)
+            (void)(lw_world_apply(&world, &out.obstacles) == LW_OK);
+        *(ok ? &taken : &refused) += 1;
+    }
+    assert_int_equal(atomic_load(&calls), before);
+    assert_true(taken > 1000 && refused > 1000 && world.version > 10);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_count_sees_every_call),
+        cmocka_unit_test(tick_plant_and_wire_allocate_nothing),
+        cmocka_unit_test(every_channel_allocates_nothing),
+    };
+    return cmocka_run_group_tests_name("no_allocation", tests, NULL, NULL);
+}
+
+#endif

@@ -1,0 +1,372 @@
+"""LCM logs of runs: framing, decoding, columns.
+
+The framing is read here and not by `lcm.EventLog`, which cannot tell a whole log from one that
+was cut. The layout of the messages comes from the generated `leeway_lcm` classes.
+
+Units are SI (m, rad, s) except where a name ends in `_ns` or `_us`, and `utime` (us since 1970).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from stat import S_ISREG
+from typing import Any, BinaryIO, TypeVar, cast
+
+import numpy as np
+from leeway_lcm import leeway as _generated
+from numpy.typing import NDArray
+
+wire = cast(Any, _generated)  # generated code carries no types: this is where they end
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SYNC = 0xEDA1DA01
+_HEADER = struct.Struct(">IqqII")  # sync, event number, time us, lengths of channel and data
+_CHANNEL_MAX = 1000  # bytes; LCM itself stays below 64
+_FINGERPRINT = 8  # bytes
+_ROBOT_CHANNEL = re.compile(r"(?:(.+)_)?(JOINT_STATE|JOINT_COMMAND|GOAL|STOP|SCENE)")
+_SCALARS = {"int8_t": ">i1", "int32_t": ">i4", "int64_t": ">i8", "double": ">f8"}
+_FIXED = {
+    "JOINT_STATE": wire.joint_state_t,
+    "JOINT_COMMAND": wire.joint_command_t,
+    "OBSTACLES": wire.obstacles_t,
+    "GOAL": wire.goal_t,
+    "STOP": wire.stop_t,
+}
+
+
+class LogError(Exception):
+    """A log that cannot be used; the text says what was expected and what to do."""
+
+
+@dataclass(frozen=True)
+class Messages:
+    """What every message carries, one entry a message, in the order of the log."""
+
+    order: Ints  # place in the log, from 0, counted over all channels
+    utime: Ints
+    mono_ns: Ints
+    session: Ints
+    seq: Ints
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def take(self: MessagesT, rows: NDArray[Any]) -> MessagesT:
+        """Return the messages of a mask or of indices.
+
+        Parameters
+        ----------
+        rows : (n,) bool or (k,) int
+        """
+        return type(self)(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+
+MessagesT = TypeVar("MessagesT", bound=Messages)
+
+
+@dataclass(frozen=True)
+class States(Messages):
+    """JOINT_STATE: fields of joint_state_t; q rad and qd rad/s are (n, 6)."""
+
+    plant_mode: Ints
+    command_session: Ints
+    command_seq: Ints
+    tick: Ints
+    period_ns: Ints
+    q: Floats
+    qd: Floats
+
+
+@dataclass(frozen=True)
+class Commands(Messages):
+    """JOINT_COMMAND: fields of joint_command_t; qd, qd_law, q are (n, 6), goal is (n, 3)."""
+
+    plant_session: Ints
+    state_seq: Ints
+    state_tick: Ints
+    state_mono_ns: Ints
+    mode: Ints
+    flags: Ints
+    qd: Floats
+    qd_law: Floats
+    q: Floats
+    goal: Floats
+    request_session: Ints
+    request_seq: Ints
+    world_session: Ints
+    world_seq: Ints
+    world_version: Ints
+    obstacle_count: Ints
+    deviation: Floats
+    distance: Floats
+    distance_point: Ints
+    distance_obstacle: Ints
+    tick: Ints
+    tick_ns: Ints
+    state_age_ns: Ints
+    wake_late_ns: Ints
+    previous_exec_ns: Ints
+    skipped: Ints
+
+
+@dataclass(frozen=True)
+class Obstacles(Messages):
+    """OBSTACLES: n used entries of id (m, 32), p (m, 32, 3) m, radius (m, 32) m."""
+
+    op: Ints
+    n: Ints
+    id: Ints
+    p: Floats
+    radius: Floats
+
+
+@dataclass(frozen=True)
+class Goals(Messages):
+    """GOAL: p (m, 3) m."""
+
+    p: Floats
+
+
+@dataclass(frozen=True)
+class Stops(Messages):
+    """STOP."""
+
+
+@dataclass(frozen=True)
+class SceneMessage:
+    """SCENE: what a program says that it runs."""
+
+    session: int
+    mono_ns: int
+    program: str
+    build: str
+    mode: str
+    file: str
+    yaml: str
+
+
+@dataclass(frozen=True)
+class Log:
+    """The messages of one robot in a log."""
+
+    path: Path
+    robot: str  # prefix of its channels, "" = none
+    truncated: int  # bytes behind the last whole event
+    counts: dict[str, int]  # whole events per channel, foreign ones too
+    undecodable: dict[str, int]  # of those, messages of another layout, per channel
+    scenes: list[SceneMessage]
+    states: States
+    commands: Commands
+    obstacles: Obstacles
+    goals: Goals
+    stops: Stops
+
+
+def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
+    """Read the messages of one robot from an LCM log.
+
+    Streams the file; memory is about the size of the messages. A log that was cut in mid-event
+    is read up to its last whole event, and `Log.truncated` counts the bytes behind it. Foreign
+    channels and messages of another layout are skipped and counted.
+
+    Parameters
+    ----------
+    path
+        File that lcm-logger wrote.
+    name
+        Robot's prefix of channels (NAME_JOINT_STATE); None takes the only robot there is.
+
+    Raises
+    ------
+    LogError
+        The file cannot be read, is no LCM log, or holds no joint state of that robot.
+    """
+    path = Path(path)
+    try:
+        if not S_ISREG(path.stat().st_mode):
+            raise LogError(f"{path}: expected a log file, found something else")
+        with path.open("rb") as file:
+            raw = _scan(path, file)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    return _decode(path, raw, _choose_robot(path, raw, name))
+
+
+# --- framing ---
+
+
+@dataclass
+class _Raw:
+    """Undecoded messages of Leeway's channels."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    order: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    data: defaultdict[str, list[bytes]] = field(default_factory=lambda: defaultdict(list))
+    events: int = 0
+    left: int = 0
+
+
+def _scan(path: Path, file: BinaryIO) -> _Raw:
+    """Collect whole events; stop at the first that is cut or damaged."""
+    size = os.fstat(file.fileno()).st_size
+    if size == 0:
+        raise LogError(f"{path}: empty: was lcm-logger stopped before anything was sent?")
+    raw = _Raw()
+    whole = 0
+    while len(head := file.read(_HEADER.size)) == _HEADER.size:
+        sync, _, _, channel_length, data_length = _HEADER.unpack(head)
+        end = whole + _HEADER.size + channel_length + data_length
+        if sync != SYNC or channel_length > _CHANNEL_MAX or end > size:
+            break
+        body = file.read(channel_length + data_length)
+        _keep(raw, body[:channel_length].decode("ascii", "replace"), body[channel_length:])
+        whole = end
+    if whole == 0:
+        _refuse(path, file)
+    raw.left = size - whole
+    return raw
+
+
+def _keep(raw: _Raw, channel: str, data: bytes) -> None:
+    raw.counts[channel] += 1
+    if channel == "OBSTACLES" or _ROBOT_CHANNEL.fullmatch(channel):
+        raw.order[channel].append(raw.events)
+        raw.data[channel].append(data)
+    raw.events += 1
+
+
+def _refuse(path: Path, file: BinaryIO) -> None:
+    """Say why a file has no whole event."""
+    file.seek(0)
+    start = file.read(4)
+    if start == struct.pack(">I", SYNC):
+        raise LogError(f"{path}: cut within its first event: nothing to read, record it again")
+    raise LogError(
+        f"{path}: not an LCM log: expected events that start with 0x{SYNC:X}, "
+        f"found 0x{start.hex().upper()} at byte 0"
+    )
+
+
+# --- decoding ---
+
+
+def _dtype(kind: Any) -> np.dtype[Any]:
+    """Return the layout of a generated message of fixed size."""
+    rows = zip(kind.__slots__, kind.__typenames__, kind.__dimensions__, strict=True)
+    return np.dtype(
+        [(name, _scalar(typename), tuple(shape or ())) for name, typename, shape in rows]
+    )
+
+
+def _scalar(typename: str) -> Any:
+    known = _SCALARS.get(typename)
+    return known if known else _dtype(getattr(wire, typename.rsplit(".", 1)[1]))
+
+
+_LAYOUT = {name: _dtype(kind) for name, kind in _FIXED.items()}
+
+
+def _fingerprint(name: str) -> bytes:
+    return cast(bytes, _FIXED[name]._get_packed_fingerprint())
+
+
+def _fits(name: str, data: bytes) -> bool:
+    size = _FINGERPRINT + _LAYOUT[name].itemsize
+    return len(data) == size and data[:_FINGERPRINT] == _fingerprint(name)
+
+
+def _channel(robot: str, name: str) -> str:
+    return f"{robot}_{name}" if robot and name != "OBSTACLES" else name
+
+
+def _choose_robot(path: Path, raw: _Raw, name: str | None) -> str:
+    """Return the prefix of the robot to read; it has at least one joint state."""
+    found = {}
+    for channel in raw.data:
+        match = _ROBOT_CHANNEL.fullmatch(channel)
+        if match and match[2] == "JOINT_STATE":
+            found[match[1] or ""] = any(_fits("JOINT_STATE", data) for data in raw.data[channel])
+    robots = sorted(robot for robot, usable in found.items() if usable)
+    if name is not None and name not in robots and robots:
+        raise LogError(f"{path}: no robot {name!r} in it: {_listed(robots)}")
+    if name is None and len(robots) > 1:
+        raise LogError(f"{path}: several robots in it, name one: {_listed(robots)}")
+    if robots:
+        return robots[0] if name is None else name
+    if found:
+        data = raw.data[_channel(next(iter(found)), "JOINT_STATE")][0]
+        raise LogError(
+            f"{path}: its JOINT_STATE has another layout: expected fingerprint "
+            f"{_fingerprint('JOINT_STATE').hex()}, found {data[:_FINGERPRINT].hex() or 'no data'}: "
+            "read it with the version of Leeway that recorded it"
+        )
+    raise LogError(
+        f"{path}: no JOINT_STATE in it: record with lcm-logger while controller and simulator run"
+    )
+
+
+def _listed(robots: list[str]) -> str:
+    return "found " + ", ".join(robot or "one without a name" for robot in robots)
+
+
+def _decode(path: Path, raw: _Raw, robot: str) -> Log:
+    undecodable: dict[str, int] = {}
+
+    def table(name: str, kind: type[MessagesT]) -> MessagesT:
+        channel = _channel(robot, name)
+        pairs = [
+            p for p in zip(raw.order[channel], raw.data[channel], strict=True) if _fits(name, p[1])
+        ]
+        if len(pairs) < len(raw.order[channel]):
+            undecodable[channel] = len(raw.order[channel]) - len(pairs)
+        return _columns(_LAYOUT[name], pairs, kind)
+
+    scene_channel = _channel(robot, "SCENE")
+    scenes = [scene for data in raw.data[scene_channel] if (scene := _decode_scene(data))]
+    if len(scenes) < len(raw.data[scene_channel]):
+        undecodable[scene_channel] = len(raw.data[scene_channel]) - len(scenes)
+    return Log(
+        path=path,
+        robot=robot,
+        truncated=raw.left,
+        counts=dict(sorted(raw.counts.items())),
+        undecodable=undecodable,
+        scenes=scenes,
+        states=table("JOINT_STATE", States),
+        commands=table("JOINT_COMMAND", Commands),
+        obstacles=table("OBSTACLES", Obstacles),
+        goals=table("GOAL", Goals),
+        stops=table("STOP", Stops),
+    )
+
+
+def _columns(
+    layout: np.dtype[Any], pairs: list[tuple[int, bytes]], kind: type[MessagesT]
+) -> MessagesT:
+    """Turn messages of one layout into columns of this machine's own byte order."""
+    rows = np.frombuffer(b"".join(data[_FINGERPRINT:] for _, data in pairs), dtype=layout)
+    flat = {name: rows[name] for name in layout.names or () if name not in ("h", "o")}
+    for group in ("h", "o"):
+        if group in (layout.names or ()):
+            flat |= {name: rows[group][name] for name in rows[group].dtype.names or ()}
+    columns = {
+        name: values.astype("f8" if values.dtype.kind == "f" else "i8")
+        for name, values in flat.items()
+    }
+    return kind(order=np.array([order for order, _ in pairs], dtype=np.int64), **columns)
+
+
+def _decode_scene(data: bytes) -> SceneMessage | None:
+    """Decode SCENE, whose texts have no fixed size. None when it is no such message."""
+    try:
+        m = wire.scene_t.decode(data)
+    except (ValueError, struct.error, IndexError):
+        return None
+    return SceneMessage(m.h.session, m.h.mono_ns, m.program, m.build, m.mode, m.file, m.yaml)
