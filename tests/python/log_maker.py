@@ -10,6 +10,8 @@ import numpy as np
 from leeway_lcm import leeway as wire
 
 from leeway import _native
+from leeway.logs.analysis import Analysis, analyse
+from leeway.logs.log import read_log
 
 PLANT, CONTROLLER, SOURCE = 11, 22, 33
 PERIOD_NS = 8_000_000
@@ -131,3 +133,22 @@ class Run:
         path = folder / name
         path.write_bytes(self.data())
         return path
+
+
+def analysed(run: Run, folder: Path) -> Analysis:
+    return analyse(read_log(run.write(folder)))
+
+
+def texts(a: Analysis, kind: str) -> list[str]:
+    return [f"{event.t:.3f} {event.text}" for event in a.events if event.kind == kind]
+
+
+def see(run: Run, rows: slice, session: int, seq: int) -> None:
+    """Make commands echo an OBSTACLES message."""
+    for command in run.commands[rows]:
+        command.world_session, command.world_seq = session, seq
+
+
+def set_limits(run: Run, lines: str) -> None:
+    """Add lines to the scene that the controller announces."""
+    run.before[1] = ("SCENE", scene(CONTROLLER, yaml=SCENE + lines))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from leeway_lcm import leeway as wire
 from log_maker import CONTROLLER, PLANT, Run, event, obstacles, scene, stamp
 
-from leeway.log import Log, LogError, read_log
+from leeway.logs.log import Log, LogError, read_log
 
 WHOLE = Run(ticks=3)
 FRAME = 28  # bytes of an event's header

@@ -17,10 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_maker import CONTROLLER, SOURCE, Run, obstacles, scene
 
-from leeway.analysis import Analysis, analyse
-from leeway.figures import deviation, joint_positions, marked_events, reduce_minmax, timing
-from leeway.log import read_log
+from leeway.logs.analysis import Analysis, analyse
+from leeway.logs.log import read_log
 from leeway.report import write_report
+from leeway.report.figures import deviation, joint_positions, marked_events, reduce_minmax, timing
 
 PICTURES = {"pose", "q", "qd", "deviation", "distance", "limits", "timing"}
 

@@ -10,6 +10,7 @@ Units are SI, angles radians; positions are in the base frame of the arm (its DH
 """
 
 from leeway._native import BUILD, Arm
+from leeway.logs.log import read_log
 from leeway.scene import Run, Scene, load_scene, simulate
 
-__all__ = ["BUILD", "Arm", "Run", "Scene", "load_scene", "simulate"]
+__all__ = ["BUILD", "Arm", "Run", "Scene", "load_scene", "read_log", "simulate"]

@@ -146,7 +146,7 @@ def _triple(
 
 def _lockstep(url: str | None) -> float:
     """Run C4 over the bus in lockstep; return the time between its first and last command, s."""
-    from leeway.log import read_log
+    from leeway.logs.log import read_log
     from leeway.run import RunConfig, run
 
     path = scenario("c4")

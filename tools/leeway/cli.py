@@ -101,8 +101,8 @@ def _load(path: Path, sets: list[str] | None) -> Any:
 
 
 def _analyse(path: Path, name: str | None = None) -> Any:
-    from leeway.analysis import analyse
-    from leeway.log import LogError, read_log
+    from leeway.logs.analysis import analyse
+    from leeway.logs.log import LogError, read_log
 
     try:
         return analyse(read_log(path, name=name))

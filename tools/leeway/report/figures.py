@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from leeway.analysis import FLAGS, MOVING_POINTS, Analysis
-from leeway.events import Event
-from leeway.log import Floats
+from leeway.logs.analysis import FLAGS, MOVING_POINTS, Analysis
+from leeway.logs.events import Event
+from leeway.logs.log import Floats
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart; line styles tell it too.
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY = (

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from leeway.log import Commands, Floats, States
-from leeway.motion import MOVING, Motion
+from leeway.logs.log import Commands, Floats, States
+from leeway.logs.motion import MOVING, Motion
 
 TOLERANCE = 1e-9  # relative
 

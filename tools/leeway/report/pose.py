@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from leeway.analysis import Analysis
-from leeway.figures import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, RED, RHO, STYLES
-from leeway.log import Floats
+from leeway.logs.analysis import Analysis
+from leeway.logs.log import Floats
+from leeway.report.figures import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, RED, RHO, STYLES
 
 POSES = 5
 OUTLINES_MAX = 4  # influence spheres drawn: more hide the arm

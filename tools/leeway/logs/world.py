@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from leeway.log import Commands, Floats, Ints, Obstacles
+from leeway.logs.log import Commands, Floats, Ints, Obstacles
 
 WORLD_MAX = 256
 CHANGE_MAX = 32
@@ -131,7 +131,7 @@ def _apply(world: dict[int, Obstacle], messages: Obstacles, row: int) -> dict[in
     """Return the set after one message, None when the controller refuses that message."""
     op, session = int(messages.op[row]), int(messages.session[row])
     entries = _entries(messages, row)
-    if entries is None or session <= 0 or messages.seq[row] <= 0 or not UPSERT <= op <= CLEAR:
+    if entries is None:
         return None
     listed = {o.id for o in entries}
     if op == CLEAR:
@@ -144,24 +144,27 @@ def _apply(world: dict[int, Obstacle], messages: Obstacles, row: int) -> dict[in
 
 
 def _entries(messages: Obstacles, row: int) -> list[Obstacle] | None:
-    """Return the used entries of a message, None when one is out of range."""
-    count, remove = int(messages.n[row]), int(messages.op[row]) == REMOVE
-    if not 0 <= count <= CHANGE_MAX:
+    """Return the used entries of a message, None when anything of it is out of range."""
+    op, session, count = (
+        int(values[row]) for values in (messages.op, messages.session, messages.n)
+    )
+    if session <= 0 or messages.seq[row] <= 0:
+        return None
+    if not UPSERT <= op <= CLEAR or not 0 <= count <= CHANGE_MAX:
         return None
     entries = []
     for i in range(count):
         x, y, z = (float(v) for v in messages.p[row, i])
-        radius = float(messages.radius[row, i])
-        values = (x, y, z, radius)
-        in_range = remove or (
-            all(math.isfinite(v) and abs(v) <= POSITION_MAX for v in values) and radius >= 0
-        )
-        if messages.id[row, i] <= 0 or not in_range:
-            return None
         entries.append(
-            Obstacle(int(messages.id[row, i]), (x, y, z), radius, int(messages.session[row]))
+            Obstacle(int(messages.id[row, i]), (x, y, z), float(messages.radius[row, i]), session)
         )
-    return entries if len({o.id for o in entries}) == count else None
+    usable = all(o.id > 0 and (op == REMOVE or _in_range(o)) for o in entries)
+    return entries if usable and len({o.id for o in entries}) == count else None
+
+
+def _in_range(obstacle: Obstacle) -> bool:
+    values = (*obstacle.p, obstacle.radius)
+    return all(math.isfinite(v) and abs(v) <= POSITION_MAX for v in values) and obstacle.radius >= 0
 
 
 def _newest(candidates: list[tuple[int, World]], before: int) -> World | None:

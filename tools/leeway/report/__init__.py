@@ -18,8 +18,8 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from leeway import figures, pose
-from leeway.analysis import Analysis
+from leeway.logs.analysis import Analysis
+from leeway.report import figures, pose
 
 PAGE = "report.html"
 FRAMES_MAX = 400

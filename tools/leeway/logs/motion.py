@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from leeway.log import Commands, Floats, Ints, Log, LogError, Messages, MessagesT, States
+from leeway.logs.log import Commands, Floats, Ints, Log, LogError, Messages, MessagesT, States
 
 HOLD, MOVING, STOPPING = range(3)
 VELOCITY = 1

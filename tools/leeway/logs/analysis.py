@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from leeway import _native
-from leeway.events import Event, list_events
-from leeway.limits import LimitUse, limit_uses
-from leeway.log import Commands, Floats, Ints, Log, LogError, SceneMessage
-from leeway.motion import select_motion
-from leeway.world import WorldLine, follow, nearest
+from leeway.logs.events import Event, list_events
+from leeway.logs.limits import LimitUse, limit_uses
+from leeway.logs.log import Commands, Floats, Ints, Log, LogError, SceneMessage
+from leeway.logs.motion import select_motion
+from leeway.logs.world import WorldLine, follow, nearest
 
 FLAGS = {
     "position": 1,

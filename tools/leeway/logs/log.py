@@ -294,21 +294,24 @@ def _choose_robot(path: Path, raw: _Raw, name: str | None) -> str:
         if match and match[2] == "JOINT_STATE":
             found[match[1] or ""] = any(_fits("JOINT_STATE", data) for data in raw.data[channel])
     robots = sorted(robot for robot, usable in found.items() if usable)
-    if name is not None and name not in robots and robots:
+    if not robots:
+        raise LogError(f"{path}: {_why_no_robot(raw, list(found))}")
+    if name is not None and name not in robots:
         raise LogError(f"{path}: no robot {name!r} in it: {_listed(robots)}")
     if name is None and len(robots) > 1:
         raise LogError(f"{path}: several robots in it, name one: {_listed(robots)}")
-    if robots:
-        return robots[0] if name is None else name
-    if found:
-        data = raw.data[_channel(next(iter(found)), "JOINT_STATE")][0]
-        raise LogError(
-            f"{path}: its JOINT_STATE has another layout: expected fingerprint "
-            f"{_fingerprint('JOINT_STATE').hex()}, found {data[:_FINGERPRINT].hex() or 'no data'}: "
-            "read it with the version of Leeway that recorded it"
-        )
-    raise LogError(
-        f"{path}: no JOINT_STATE in it: record with lcm-logger while controller and simulator run"
+    return robots[0] if name is None else name
+
+
+def _why_no_robot(raw: _Raw, prefixes: list[str]) -> str:
+    """Say what a log without a usable joint state has instead."""
+    if not prefixes:
+        return "no JOINT_STATE in it: record with lcm-logger while controller and simulator run"
+    data = raw.data[_channel(prefixes[0], "JOINT_STATE")][0]
+    return (
+        "its JOINT_STATE has another layout: expected fingerprint "
+        f"{_fingerprint('JOINT_STATE').hex()}, found {data[:_FINGERPRINT].hex() or 'no data'}: "
+        "read it with the version of Leeway that recorded it"
     )
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from leeway.log import Floats, Log, Messages
-from leeway.motion import MOVING, STOPPING, Motion, sessions_of
-from leeway.world import Obstacle, World, WorldLine
+from leeway.logs.log import Floats, Log, Messages
+from leeway.logs.motion import MOVING, STOPPING, Motion, sessions_of
+from leeway.logs.world import Obstacle, World, WorldLine
 
 STOPPED, STALE, NOT_FINITE = 8, 16, 32
 MERGE_S = 0.5  # moves of an obstacle that follow one another this closely are one event

@@ -1,0 +1,172 @@
+"""Obstacles in force at every tick, and distances to them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from log_maker import (
+    PERIOD_NS,
+    PLANT,
+    SOURCE,
+    Run,
+    analysed,
+    obstacles,
+    see,
+    texts,
+)
+
+from leeway.logs.log import read_log
+from leeway.logs.world import follow, nearest
+
+PERIOD = PERIOD_NS * 1e-9
+DAMAGED = Run(ticks=8)
+
+
+def test_obstacles_in_force_follow_the_echo_not_the_order_of_the_log(tmp_path: Path) -> None:
+    run = Run(ticks=31)
+    near = (0.0, -0.8, 0.1)
+    run.inserted[5] = [("OBSTACLES", obstacles(SOURCE, 1, 0, [(900, near, 0.05)]))]
+    run.inserted[15] = [("OBSTACLES", obstacles(SOURCE, 2, 1, [(900, (0.0, 0.0, 0.0), 0.0)]))]
+    see(run, slice(10, 20), SOURCE, 1)  # taken in five ticks after it was logged
+    see(run, slice(20, 31), SOURCE, 2)
+    a = analysed(run, tmp_path)
+    assert np.flatnonzero((a.nearest_obstacle == 900).any(axis=1)).tolist() == list(range(10, 20))
+    centre = np.linalg.norm(a.points[12, 4] - near)
+    assert a.distances[12, 4] == pytest.approx(
+        min(centre - 0.05, np.linalg.norm(a.points[12, 4] - [1, 1, 0.4]))
+    )
+    assert texts(a, "obstacle") == [
+        "0.000 obstacle 1 known at the start: point at (1, 1, 0.4) m, from leeway-simulator",
+        "0.080 obstacle 900 added: sphere of radius 0.05 m at (0, -0.8, 0.1) m, "
+        f"from another source, session {SOURCE}",
+        "0.160 obstacle 900 removed",
+    ]
+    assert 10 * PERIOD - 1e-9 <= a.smallest.t < 20 * PERIOD
+    assert a.smallest.obstacle == 900
+    assert a.smallest.point >= 2
+
+
+def test_repeated_message_is_taken_where_it_came_last(tmp_path: Path) -> None:
+    run = Run(ticks=21)
+    far = obstacles(SOURCE, 1, 0, [(7, (2.0, 0.0, 0.0), 0.0)])
+    run.inserted = {
+        5: [("OBSTACLES", far)],
+        8: [("OBSTACLES", obstacles(44, 1, 0, [(8, (3.0, 0.0, 0.0), 0.0)]))],
+        12: [("OBSTACLES", far)],
+    }
+    see(run, slice(5, 8), SOURCE, 1)
+    see(run, slice(8, 12), 44, 1)
+    see(run, slice(12, None), SOURCE, 1)
+    a = analysed(run, tmp_path)
+    assert [len(a.world.worlds[k]) for k in a.world.index[[4, 6, 10, 20]]] == [1, 2, 3, 3]
+
+
+@pytest.mark.parametrize(
+    "items",
+    [
+        [(7, (0.0, 0.0, 0.0), -0.1)],
+        [(7, (0.0, 0.0, 100.1), 0.1)],
+        [(7, (0.0, float("nan"), 0.0), 0.1)],
+        [(0, (0.0, 0.0, 0.0), 0.1)],
+        [(7, (0.0, 0.0, 0.0), 0.1), (7, (0.0, 0.0, 1.0), 0.1)],
+    ],
+)
+def test_messages_that_the_controller_refuses_change_nothing(
+    tmp_path: Path, items: list[Any]
+) -> None:
+    run = Run(ticks=5)
+    run.before.append(("OBSTACLES", obstacles(SOURCE, 1, 0, items)))
+    run.before.append(("OBSTACLES", obstacles(SOURCE, 2, 0, [(9, (5.0, 0.0, 0.0), 0.0)])))
+    see(run, slice(0, None), SOURCE, 2)
+    a = analysed(run, tmp_path)
+    assert [o.id for o in a.world.worlds[0]] == [1, 9]
+
+
+def test_moves_in_quick_succession_are_one_event(tmp_path: Path) -> None:
+    run = Run(ticks=41)
+    for k in range(10):
+        message = obstacles(SOURCE, k + 1, 0, [(7, (1.0, 0.0, 0.1 * k), 0.0)])
+        run.inserted[k + 5] = [("OBSTACLES", message)]
+        see(run, slice(k + 5, None), SOURCE, k + 1)
+    found = texts(analysed(run, tmp_path), "obstacle")
+    assert len(found) == 3
+    assert found[1].startswith("0.040 obstacle 7 added")
+    assert "8 more moves until 0.112 s: changed: now point at (1, 0, 0.9) m" in found[2]
+
+
+OPS = st.tuples(
+    st.sampled_from([PLANT, SOURCE]),
+    st.integers(0, 3),
+    st.lists(st.tuples(st.integers(0, 4), st.floats(-101, 101), st.floats(-0.1, 1)), max_size=4),
+)
+
+
+Model = dict[int, tuple[float, float, int]]
+
+
+def change(model: Model, session: int, op: int, items: list[Any]) -> Model | None:
+    """Return the plain model after one message, None when the message is refused."""
+    ids = [i for i, _, _ in items]
+    in_range = op == 1 or all(abs(x) <= 100 and r >= 0 for _, x, r in items)
+    if any(i <= 0 for i in ids) or len(set(ids)) < len(ids) or not in_range:
+        return None
+    if op == 3:
+        return {}
+    if op == 1:
+        return {i: o for i, o in model.items() if i not in ids}
+    kept = {i: o for i, o in model.items() if op == 0 or o[2] != session or i in ids}
+    return kept | {i: (x, r, session) for i, x, r in items}
+
+
+@settings(max_examples=60, deadline=None)
+@given(ops=st.lists(OPS, min_size=1, max_size=8))
+def test_world_agrees_with_a_plain_model(
+    tmp_path_factory: pytest.TempPathFactory, ops: list[Any]
+) -> None:
+    run = Run(ticks=len(ops) + 2)
+    expected: list[Model] = [{1: (1.0, 0.0, PLANT)}]
+    run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 0, [(1, (1.0, 0.0, 0.0), 0.0)]))
+    for k, (session, op, items) in enumerate(ops, start=1):
+        entries = [(i, (x, 0.0, 0.0), r) for i, x, r in items]
+        run.inserted[k] = [("OBSTACLES", obstacles(session, k + 1, op, entries))]
+        after = change(expected[-1], session, op, items)
+        if after is not None:
+            see(run, slice(k, None), session, k + 1)
+        expected.append(expected[-1] if after is None else after)
+    log = read_log(run.write(tmp_path_factory.mktemp("world")))
+    line = follow(log.obstacles, log.commands)
+    found = [{o.id: (o.p[0], o.radius, o.session) for o in line.worlds[i]} for i in line.index]
+    assert found[: len(expected)] == expected
+    assert line.unknown_ticks == 0
+
+
+def test_nearest_is_the_smallest_over_all_obstacles(tmp_path: Path) -> None:
+    run = Run(ticks=3)
+    items = [(k, (0.3 * k, -0.2 * k, 0.1), 0.02 * k) for k in range(1, 9)]
+    run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, items))
+    log = read_log(run.write(tmp_path))
+    points = np.random.default_rng(1).normal(size=(3, 6, 3))
+    distance, obstacle = nearest(points, follow(log.obstacles, log.commands))
+    for row, column in np.ndindex(3, 6):
+        each = {k: float(np.linalg.norm(points[row, column] - p)) - r for k, p, r in items}
+        best = min(each, key=lambda k: each[k])
+        assert obstacle[row, column] == best
+        assert distance[row, column] == pytest.approx(each[best], abs=1e-14)
+
+
+def test_no_obstacle_means_no_distance(tmp_path: Path) -> None:
+    run = Run(ticks=5)
+    run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, []))
+    a = analysed(run, tmp_path)
+    assert np.isnan(a.smallest_distance)
+    assert a.to_json()["smallest_distance"] == {
+        "distance": None,
+        "point": 0,
+        "obstacle": 0,
+        "t": None,
+    }

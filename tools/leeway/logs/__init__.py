@@ -1,0 +1,1 @@
+"""Reading logs: messages as columns, the motion in them, and its numbers."""
