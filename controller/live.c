@@ -36,12 +36,13 @@ struct live {
     _Alignas(LW_CACHE_LINE) struct arrival state_slots[LW_MAILBOX_SLOTS];
     _Alignas(LW_CACHE_LINE) struct lw_world world_slots[LW_MAILBOX_SLOTS];
     _Alignas(LW_CACHE_LINE) struct lw_request request_slots[LW_MAILBOX_SLOTS];
-    struct lw_world world;       // main's working copy
-    struct lw_stamp last_state;  // rx: newest joint state taken
-    int64_t world_refused;       // main: changes that did not fit
-    atomic_bool stopping;        // main -> rt: brake, then end
-    atomic_bool rt_done;         // rt -> main: at rest, or never moved
-    atomic_int_fast64_t skipped; // rt -> main
+    struct lw_world world;             // main's working copy
+    struct lw_request_memory requests; // main: those put into the mailbox
+    struct lw_stamp last_state;        // rx: newest joint state taken
+    int64_t world_refused;             // main: changes that did not fit
+    atomic_bool stopping;              // main -> rt: brake, then end
+    atomic_bool rt_done;               // rt -> main: at rest, or never moved
+    atomic_int_fast64_t skipped;       // rt -> main
 };
 
 // --- receiving ---
@@ -77,6 +78,9 @@ static void on_request(void *user, enum lw_channel channel, const union lw_messa
 {
     (void)channel;
     struct live *live = user;
+    // Repetitions stay out of the mailbox, where they could replace a newer request that no tick has taken yet.
+    if (!lw_request_is_new(&live->requests, &message->request))
+        return;
     struct lw_request *slot = lw_mailbox_slot(&live->request_box);
     *slot = message->request;
     lw_mailbox_publish(&live->request_box);

@@ -51,19 +51,15 @@ static void estimate(struct lw_controller_state *state, const struct lw_tick_inp
 
 // --- select request ---
 
-// Obeys a request once: its sender repeats it until it sees the echo, and a late repetition must not undo a newer one.
+// Adopts a new request. A stop has no goal of its own: the arm still knows where it was going.
 static void select_request(struct lw_controller_state *state, const struct lw_request *request)
 {
-    struct lw_stamp *obeyed = &state->obeyed[request->kind];
-    const struct lw_stamp *next = &request->stamp;
-    if (next->session == 0 || (next->session == obeyed->session && next->seq <= obeyed->seq))
+    if (!lw_request_is_new(&state->requests, request))
         return;
-    // A stop has no goal of its own: the arm still knows where it was going.
     const struct lw_request before = state->request;
     state->request = *request;
     if (request->kind == LW_REQUEST_STOP)
         memcpy(state->request.goal, before.goal, sizeof before.goal);
-    *obeyed = *next;
 }
 
 // --- law ---
@@ -91,9 +87,11 @@ static void ask_law(const struct lw_controller *config, const struct lw_controll
         config->law->step(&config->params, &law_in, law);
         return;
     }
+    // Nothing is known then, neither the wish nor where the frames are.
     const double nan = (double)NAN;
     *law = (struct lw_law_output){.qd = {nan, nan, nan, nan, nan, nan}, .nearest = {.distance = -1}};
-    memset(frame, 0, LW_NJ * sizeof *frame);
+    for (int i = 0; i < LW_NJ; i++)
+        frame[i] = (struct lw_pose){.p = {nan, nan, nan}};
 }
 
 // --- explain ---

@@ -9,10 +9,11 @@
 #ifndef LW_CONTROLLER_TICK_H
 #define LW_CONTROLLER_TICK_H
 
-#include "arm/joint.h"       // struct lw_joint_state, struct lw_joint_command, struct lw_request
-#include "collision/world.h" // struct lw_world
-#include "controller/law.h"  // struct lw_law
-#include "scene/scene.h"     // struct lw_scene
+#include "arm/joint.h"          // struct lw_joint_state, struct lw_joint_command, struct lw_request
+#include "collision/world.h"    // struct lw_world
+#include "controller/law.h"     // struct lw_law
+#include "controller/request.h" // struct lw_request_memory
+#include "scene/scene.h"        // struct lw_scene
 
 #include <stdbool.h> // bool
 
@@ -29,11 +30,11 @@ struct lw_controller {
 
 // Lives from tick to tick.
 struct lw_controller_state {
-    int64_t tick;                             // ticks so far
-    int64_t plant_session;                    // plant being controlled, 0 = none yet
-    double velocity[LW_NJ];                   // rad/s, command in force
-    struct lw_request request;                // request in force
-    struct lw_stamp obeyed[LW_REQUEST_KINDS]; // newest request obeyed, by kind: each kind is counted apart
+    int64_t tick;                      // ticks so far
+    int64_t plant_session;             // plant being controlled, 0 = none yet
+    double velocity[LW_NJ];            // rad/s, command in force
+    struct lw_request request;         // request in force
+    struct lw_request_memory requests; // those obeyed before
 };
 
 struct lw_tick_input {

@@ -34,6 +34,9 @@ static enum lw_verdict judge(const struct lw_plant *plant, const struct lw_plant
         return LW_REFUSED_PLANT;
     if (command->mode != LW_COMMAND_VELOCITY)
         return LW_REFUSED_IDLE;
+    if (command->state_tick > state->tick ||
+        state->tick - command->state_tick > 2 * plant->timeout_ns / plant->period_ns)
+        return LW_REFUSED_STALE;
     if (!same_controller && state->mode == LW_PLANT_MOVING)
         return LW_REFUSED_FOREIGN;
     return same_controller && command->stamp.seq <= state->command_seq ? LW_REFUSED_OLD : LW_ACCEPTED;

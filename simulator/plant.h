@@ -35,12 +35,18 @@ struct lw_plant_state {
     int64_t command_ns; // when its newest command was accepted
 };
 
-enum lw_verdict { LW_ACCEPTED, LW_REFUSED_IDLE, LW_REFUSED_PLANT, LW_REFUSED_FOREIGN, LW_REFUSED_OLD };
+enum lw_verdict {
+    LW_ACCEPTED,
+    LW_REFUSED_IDLE,    // asks for no motion
+    LW_REFUSED_PLANT,   // meant for another plant
+    LW_REFUSED_STALE,   // computed from a state older than twice the timeout, or from one that never was
+    LW_REFUSED_FOREIGN, // from a second controller while the first one is alive
+    LW_REFUSED_OLD,     // a duplicate, or overtaken by a newer one
+};
 
 void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const struct lw_scene *scene, int64_t session);
 
-// Takes a validated command or says why not: IDLE asks for no motion, PLANT is meant for another plant, FOREIGN comes
-// from a second controller while the first one is alive, OLD is a duplicate or came late.
+// Takes a validated command or says why not.
 enum lw_verdict lw_plant_accept(const struct lw_plant *plant, struct lw_plant_state *state,
                                 const struct lw_joint_command *command, int64_t now_ns);
 

@@ -74,7 +74,7 @@ struct lw_joint_command {
 };
 
 // Operator -> controller.
-enum lw_request_kind { LW_REQUEST_GOAL, LW_REQUEST_STOP, LW_REQUEST_KINDS };
+enum lw_request_kind { LW_REQUEST_GOAL, LW_REQUEST_STOP };
 
 struct lw_request {
     struct lw_stamp stamp;

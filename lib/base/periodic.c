@@ -19,7 +19,7 @@ void lw_periodic_skip(struct lw_periodic *loop, int64_t now_ns)
 {
     if (now_ns <= loop->deadline_ns)
         return;
-    const int64_t missed = (now_ns - loop->deadline_ns) / loop->period_ns + 1;
+    const int64_t missed = (now_ns - loop->deadline_ns + loop->period_ns - 1) / loop->period_ns;
     loop->deadline_ns += missed * loop->period_ns;
     loop->skipped += missed;
 }

@@ -104,28 +104,39 @@ static bool read_choice(const struct lw_key *key, const yaml_node_t *node, int *
     return false;
 }
 
+// One entry of a vector or of limits; a limit may be off.
+static bool read_entry(const struct lw_key *key, const yaml_node_t *node, double *out)
+{
+    const char *text = lw_tree_scalar(node);
+    const bool off = key->kind == LW_LIMITS && text != NULL && strcmp(text, "off") == 0;
+    if (off)
+        *out = HUGE_VAL;
+    return off || read_number(key, node, out);
+}
+
 static bool read_vector(const struct lw_key *key, const struct value *v, double *out)
 {
     if (lw_tree_length(v->node) != key->count)
         return false;
     for (int i = 0; i < key->count; i++)
-        if (!read_number(key, lw_tree_item(v->tree, v->node, i), &out[i]))
+        if (!read_entry(key, lw_tree_item(v->tree, v->node, i), &out[i]))
             return false;
     return true;
 }
 
 static bool read_limits(const struct lw_key *key, const struct value *v, double *out)
 {
-    const char *text = lw_tree_scalar(v->node);
-    if (text == NULL)
+    if (lw_tree_scalar(v->node) == NULL)
         return read_vector(key, v, out);
-    double number = HUGE_VAL;
-    if (strcmp(text, "off") != 0 && !read_number(key, v->node, &number))
+    double limit = 0;
+    if (!read_entry(key, v->node, &limit))
         return false;
     for (int i = 0; i < key->count; i++)
-        out[i] = number;
+        out[i] = limit;
     return true;
 }
+
+// --- composites ---
 
 static enum lw_status refuse_kind(struct reader *r, const struct value *at, const struct lw_key *key)
 {
@@ -137,7 +148,7 @@ static enum lw_status refuse_kind(struct reader *r, const struct value *at, cons
     for (int i = 0; is_vector && lw_tree_length(at->node) == key->count && i < key->count; i++) {
         double number = 0;
         wrong = lw_tree_item(at->tree, at->node, i);
-        if (!read_number(key, wrong, &number))
+        if (!read_entry(key, wrong, &number))
             break;
     }
     lw_tree_found(wrong, found, sizeof found);
@@ -220,7 +231,7 @@ static enum lw_status read_set(struct reader *r, const struct lw_key *key, int s
     if (!lw_tree_parse(&tree, strchr(r->source->set[set], '=') + 1, problem, sizeof problem))
         return refuse(r, &v, "%s", problem);
     v.node = lw_tree_root(&tree);
-    enum lw_status status = read_value(r, key, &v, parent);
+    enum lw_status status = v.node != NULL ? read_value(r, key, &v, parent) : refuse_kind(r, &v, key);
     lw_tree_free(&tree);
     return status;
 }

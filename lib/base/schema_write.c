@@ -24,7 +24,7 @@ static void write_number(double number, FILE *to)
     do
         snprintf(text, sizeof text, "%.*g", digits, number);
     while (strtod(text, NULL) != number && digits++ < 17);
-    fputs(text, to);
+    fputs(isinf(number) ? "off" : text, to); // only limits can be infinite
 }
 
 static void write_numbers(const double *numbers, int count, FILE *to)
@@ -52,11 +52,6 @@ static void write_scalar(const struct lw_key *key, const unsigned char *at, FILE
     case LW_INTEGER: fprintf(to, "%d", read_int(at)); break;
     case LW_CHOICE: fputs(key->names[read_int(at)], to); break;
     case LW_LIMITS:
-        if (isinf(numbers[0])) {
-            fputs("off", to);
-            break;
-        }
-        // fall through
     case LW_VECTOR: write_numbers(numbers, key->count, to); break;
     case LW_SECTION:
     case LW_LIST: break;

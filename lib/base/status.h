@@ -18,6 +18,7 @@
     X(LW_E_NOT_FINITE, "value is not a finite number")                                                                 \
     X(LW_E_SIZE, "message has the wrong size")                                                                         \
     X(LW_E_DECODE, "message is of another type or version")                                                            \
+    X(LW_E_OLD, "message was overtaken by a newer one")                                                                \
     X(LW_E_FULL, "no room left")                                                                                       \
     X(LW_E_IO, "file or memory error")                                                                                 \
     X(LW_E_SCENE, "scene refused")                                                                                     \

@@ -12,6 +12,17 @@
 #include <stdio.h>  // snprintf
 #include <string.h> // strlen, strcmp
 
+// Whether another document follows, or what follows is not YAML.
+static bool has_more(yaml_parser_t *parser)
+{
+    yaml_document_t next;
+    if (yaml_parser_load(parser, &next) == 0)
+        return true;
+    const bool more = yaml_document_get_root_node(&next) != NULL;
+    yaml_document_delete(&next);
+    return more;
+}
+
 bool lw_tree_parse(struct lw_tree *tree, const char *text, char *problem, size_t size)
 {
     yaml_parser_t parser;
@@ -20,10 +31,15 @@ bool lw_tree_parse(struct lw_tree *tree, const char *text, char *problem, size_t
         return false;
     }
     yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
-    const bool ok = yaml_parser_load(&parser, &tree->document) != 0;
-    if (!ok)
+    bool ok = yaml_parser_load(&parser, &tree->document) != 0;
+    if (!ok) {
         snprintf(problem, size, ":%zu: not YAML: %s", parser.problem_mark.line + 1,
                  parser.problem ? parser.problem : "unreadable");
+    } else if (has_more(&parser)) {
+        snprintf(problem, size, ": expected one YAML document, found more behind it");
+        lw_tree_free(tree);
+        ok = false;
+    }
     yaml_parser_delete(&parser);
     return ok;
 }

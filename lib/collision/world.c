@@ -78,9 +78,29 @@ static bool put(struct lw_world *world, struct lw_obstacle obstacle, int64_t ses
     return true;
 }
 
+// Place in the table of senders of a session; a new one takes the place of the oldest.
+static struct lw_sender *find_sender(struct lw_world *world, int64_t session)
+{
+    for (int i = 0; i < LW_SENDERS_MAX; i++)
+        if (world->sender[i].session == session)
+            return &world->sender[i];
+    struct lw_sender *sender = &world->sender[world->next_sender];
+    world->next_sender = (world->next_sender + 1) % LW_SENDERS_MAX;
+    *sender = (struct lw_sender){.session = session};
+    return sender;
+}
+
 enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     struct lw_world next = *world;
+    struct lw_sender *sender = find_sender(&next, change->stamp.session);
+    if (change->stamp.seq < sender->seq)
+        return LW_E_OLD;
+    if (change->stamp.seq == sender->seq) {
+        world->last = change->stamp;
+        return LW_OK;
+    }
+    sender->seq = change->stamp.seq;
     bool changed = drop(&next, change) > 0;
 
     bool full = false;

@@ -12,7 +12,7 @@
 #include "base/stamp.h"  // struct lw_stamp
 #include "base/status.h" // enum lw_status
 
-enum { LW_WORLD_MAX = 256, LW_CHANGE_MAX = 32 };
+enum { LW_WORLD_MAX = 256, LW_CHANGE_MAX = 32, LW_SENDERS_MAX = 32 };
 
 // A point (radius 0) or a sphere.
 struct lw_obstacle {
@@ -32,11 +32,19 @@ struct lw_obstacle_change {
     struct lw_obstacle obstacle[LW_CHANGE_MAX]; // session is ignored: the stamp names the source
 };
 
+// Newest message of a sender.
+struct lw_sender {
+    int64_t session;
+    int64_t seq;
+};
+
 struct lw_world {
     int64_t version;      // number of changes of the set so far; 0 = nothing heard
     struct lw_stamp last; // session and seq of the newest message taken in
     int count;
     struct lw_obstacle obstacle[LW_WORLD_MAX];
+    struct lw_sender sender[LW_SENDERS_MAX]; // senders heard last; the oldest makes room
+    int next_sender;
 };
 
 // Signed distance from point x to an obstacle's surface, and the direction of growing distance.
@@ -44,8 +52,10 @@ struct lw_world {
 double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3], double away[3]);
 
 // Applies a change. The version grows only when the set really differs; a repeated message changes nothing.
-// An id belongs to the source that sent it last; REMOVE and CLEAR reach obstacles of every source.
-// Fails LW_E_FULL when the result would exceed LW_WORLD_MAX; the world is unchanged then. Cost: O(changes * count).
+// An id belongs to the source that sent it last; REMOVE and CLEAR reach obstacles of every source. A message that comes
+// again is noted as the newest one heard, because its sender waits for that, and changes nothing.
+// Fails LW_E_OLD when its source has sent a newer message already, LW_E_FULL when the result would exceed LW_WORLD_MAX;
+// the world is unchanged then. Cost: O(changes * count).
 LW_MUST_CHECK enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change);
 
 #endif

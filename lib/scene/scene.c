@@ -55,6 +55,22 @@ static enum lw_status check_start(const struct lw_scene *scene, const struct lw_
     return LW_OK;
 }
 
+// A plant weaker than the guard believes would overshoot what the guard brakes for.
+static enum lw_status check_plant(const struct lw_scene *scene, const struct lw_source *source, struct lw_error *error)
+{
+    for (int j = 0; j < LW_NJ; j++) {
+        const double velocity = scene->limits.velocity[j], acceleration = scene->limits.acceleration[j];
+        if (scene->plant.velocity[j] < velocity)
+            return refuse(error, source, "plant.velocity: joint %d: expected at least limits.velocity = %g, found %g",
+                          j + 1, velocity, scene->plant.velocity[j]);
+        if (scene->plant.acceleration[j] < acceleration)
+            return refuse(error, source,
+                          "plant.acceleration: joint %d: expected at least limits.acceleration = %g, found %g", j + 1,
+                          acceleration, scene->plant.acceleration[j]);
+    }
+    return LW_OK;
+}
+
 static enum lw_status check_rates(const struct lw_scene *scene, const struct lw_source *source, struct lw_error *error)
 {
     const double ratio = scene->plant.rate_hz / scene->rate_hz;
@@ -99,6 +115,8 @@ enum lw_status lw_scene_read(const struct lw_source *source, struct lw_scene *sc
     if (status == LW_OK)
         status = check_start(&next, source, error);
     if (status == LW_OK)
+        status = check_plant(&next, source, error);
+    if (status == LW_OK)
         status = check_rates(&next, source, error);
     if (status == LW_OK)
         status = check_obstacles(&next, source, error);
@@ -115,7 +133,8 @@ static char *read_file(const char *path)
         return NULL;
     char *text = calloc(1, FILE_MAX + 1);
     const size_t length = text != NULL ? fread(text, 1, FILE_MAX + 1, file) : 0;
-    const int problem = ferror(file) ? errno : length > FILE_MAX ? EFBIG : 0;
+    const bool is_text = text != NULL && strlen(text) == length; // a zero byte would hide what follows
+    const int problem = ferror(file) ? errno : length > FILE_MAX ? EFBIG : is_text ? 0 : EILSEQ;
     (void)fclose(file); // it was only read
     if (text == NULL || problem == 0)
         return text;

@@ -21,7 +21,7 @@ static const char *const attraction_names[] = {"cone", "cone_par", NULL};
 // Field of the scene, and the ranges that come again.
 #define AT(field) .offset = offsetof(struct lw_scene, field)
 #define JOINTS .kind = LW_VECTOR, .count = LW_NJ
-#define LIMITS(limit_unit) .kind = LW_LIMITS, .count = LW_NJ, POSITIVE, .unit = limit_unit
+#define LIMITS(limit_unit) .kind = LW_LIMITS, .count = LW_NJ, .min = 1e-6, .max = HUGE_VAL, .unit = limit_unit
 #define POSITIVE .min = 0, .max = HUGE_VAL, .above_min = true
 #define ANGLE .min = -2 * PI, .max = 2 * PI, .unit = "rad"
 #define WORKSPACE .kind = LW_VECTOR, .count = 3, .min = -100, .max = 100, .unit = "m"

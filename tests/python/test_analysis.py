@@ -299,7 +299,7 @@ def test_damaged_numbers_raise_nothing_but_log_error(
 
 def test_json_is_strict_and_without_arrays(tmp_path: Path) -> None:
     run = Run()
-    set_limits(run, "limits: {velocity: off}\n")
+    set_limits(run, "limits: {velocity: off}\nplant: {velocity: off}\n")
     document = json.dumps(analysed(run, tmp_path).to_json(), allow_nan=False)
     back = json.loads(document)
     assert back["limits"][1]["limit"] == [None] * 6

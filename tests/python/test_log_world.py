@@ -112,15 +112,18 @@ Model = dict[int, tuple[float, float, int]]
 def change(model: Model, session: int, op: int, items: list[Any]) -> Model | None:
     """Return the plain model after one message, None when the message is refused."""
     ids = [i for i, _, _ in items]
-    in_range = op == 1 or all(abs(x) <= 100 and r >= 0 for _, x, r in items)
-    if any(i <= 0 for i in ids) or len(set(ids)) < len(ids) or not in_range:
+    in_range = all(abs(x) <= 100 and r >= 0 for _, x, r in items)
+    if min(ids, default=1) <= 0 or len(set(ids)) < len(ids) or (op != 1 and not in_range):
         return None
     if op == 3:
         return {}
     if op == 1:
         return {i: o for i, o in model.items() if i not in ids}
-    kept = {i: o for i, o in model.items() if op == 0 or o[2] != session or i in ids}
-    return kept | {i: (x, r, session) for i, x, r in items}
+    return survivors(model, session, op) | {i: (x, r, session) for i, x, r in items}
+
+
+def survivors(model: Model, session: int, op: int) -> Model:
+    return {i: o for i, o in model.items() if op == 0 or o[2] != session}
 
 
 @settings(max_examples=60, deadline=None)

@@ -43,9 +43,12 @@ static struct lw_joint_command command(int64_t session, int64_t seq, double qd)
                                      .qd = {qd, -qd, qd / 2, 0, qd, -qd}};
 }
 
+// Offers a command as computed from the arm's present state.
 static enum lw_verdict offer(struct rig *rig, const struct lw_joint_command *c, int64_t now_ns)
 {
-    return lw_plant_accept(&rig->plant, &rig->arm, c, now_ns);
+    struct lw_joint_command fresh = *c;
+    fresh.state_tick = rig->arm.tick;
+    return lw_plant_accept(&rig->plant, &rig->arm, &fresh, now_ns);
 }
 
 static void accept(struct rig *rig, int64_t session, int64_t seq, double qd, int64_t now_ns)
@@ -118,6 +121,25 @@ static void a_second_controller_waits_for_the_first_to_cease(void **state)
     assert_int_equal(offer(&rig, &c, 0), LW_ACCEPTED);
     const struct lw_joint_command late = command(FIRST, 1001, 0.5);
     refuse(&rig, &late, LW_REFUSED_FOREIGN);
+}
+
+// A command from a state two timeouts old is taken, one from an older state or from the future is not.
+static void a_command_from_an_old_state_is_refused(void **state)
+{
+    (void)state;
+    struct rig rig = start();
+    accept(&rig, FIRST, 1, 0.5, 0);
+    for (int k = 0; k < 50; k++)
+        lw_plant_step(&rig.plant, &rig.arm, 0);
+    const int64_t oldest = rig.arm.tick - 2 * rig.plant.timeout_ns / rig.plant.period_ns;
+    struct lw_joint_command c = command(FIRST, 2, 0.4);
+    c.state_tick = oldest - 1;
+    assert_int_equal(lw_plant_accept(&rig.plant, &rig.arm, &c, 0), LW_REFUSED_STALE);
+    c.state_tick = rig.arm.tick + 1;
+    assert_int_equal(lw_plant_accept(&rig.plant, &rig.arm, &c, 0), LW_REFUSED_STALE);
+    assert_int_equal(rig.arm.command_seq, 1);
+    c.state_tick = oldest;
+    assert_int_equal(lw_plant_accept(&rig.plant, &rig.arm, &c, 0), LW_ACCEPTED);
 }
 
 // Duplicates and late commands are refused, while moving and after a timeout; a newer one is obeyed again.
@@ -331,6 +353,7 @@ int main(void)
         cmocka_unit_test(a_command_for_another_plant_is_refused),
         cmocka_unit_test(an_idle_command_moves_nothing),
         cmocka_unit_test(a_second_controller_waits_for_the_first_to_cease),
+        cmocka_unit_test(a_command_from_an_old_state_is_refused),
         cmocka_unit_test(a_command_is_obeyed_once_and_in_order),
         cmocka_unit_test(the_timeout_is_exact_to_the_nanosecond),
         cmocka_unit_test(it_comes_to_rest_when_commands_cease),

@@ -109,9 +109,12 @@ static void what_is_left_out_is_the_default(void **state)
 static void a_written_scene_reads_back_to_the_same_bits(void **state)
 {
     (void)state;
-    const char *const sets[] = {"limits.velocity=off",
-                                "obstacles=[{at: [1, 0.1, -3e-9], radius: 0.1}, {at: [0, 0, 0]}]", "rate_hz=333",
-                                "robot=ur10", "q0=[0.1, 1e-17, 2, -3, 6.2, -0.7]"};
+    const char *const sets[] = {"plant.velocity=off",
+                                "plant.acceleration=[off, 8, 9, off, 10, 8.5]",
+                                "obstacles=[{at: [1, 0.1, -3e-9], radius: 0.1}, {at: [0, 0, 0]}]",
+                                "rate_hz=333",
+                                "robot=ur10",
+                                "q0=[0.1, 1e-17, 2, -3, 6.2, -0.7]"};
     for (size_t i = 0; i < sizeof sets / sizeof sets[0]; i++) {
         const struct lw_scene scene = accept(sets[i]);
         char *text = NULL;
@@ -150,6 +153,36 @@ static void the_plants_rate_is_a_whole_multiple(void **state)
     refuse("plant.rate_hz=750", "s.yaml: plant.rate_hz: expected a whole multiple of rate_hz = 500, found 750");
     refuse("plant.rate_hz=1e-8", "s.yaml: plant.rate_hz: expected a whole multiple of rate_hz = 500, found 1e-08");
     refuse("plant.rate_hz=1000.1", "s.yaml: plant.rate_hz: expected a whole multiple of rate_hz = 500, found 1000.1");
+}
+
+// What the guard brakes for, the plant can brake: weaker limits than the guard's are refused, joint by joint.
+static void the_plant_is_as_strong_as_the_guard_believes(void **state)
+{
+    (void)state;
+    assert_near(accept("plant.acceleration=8").plant.acceleration[3], 8, 0);
+    refuse("plant.acceleration=[8, 8, 8, 7.5, 8, 8]",
+           "s.yaml: plant.acceleration: joint 4: expected at least limits.acceleration = 8, found 7.5");
+    refuse("limits.acceleration=off",
+           "s.yaml: plant.acceleration: joint 1: expected at least limits.acceleration = inf, found 15");
+    refuse("plant.velocity=3", "s.yaml: plant.velocity: joint 1: expected at least limits.velocity = 3.14159, found 3");
+}
+
+// A zero byte ends C's strings, not the file: what stands behind it may not be ignored.
+static void a_file_with_a_zero_byte_is_refused(void **state)
+{
+    (void)state;
+    char path[] = "scene-XXXXXX";
+    const int fd = mkstemp(path);
+    FILE *file = fdopen(fd, "w");
+    assert_non_null(file);
+    fputs(smallest, file);
+    fputc('\0', file);
+    fputs("duration_s: -1\n", file);
+    assert_int_equal(fclose(file), 0);
+    struct lw_scene scene;
+    struct lw_error error = {""};
+    assert_int_equal(lw_scene_load(path, NULL, 0, &scene, &error), LW_E_IO);
+    remove(path);
 }
 
 // The plant must hear two commands in its timeout, or one late command stops it.
@@ -301,6 +334,8 @@ int main(void)
         cmocka_unit_test(a_written_scene_reads_back_to_the_same_bits),
         cmocka_unit_test(the_plant_runs_at_the_controllers_rate_unless_told),
         cmocka_unit_test(the_plants_rate_is_a_whole_multiple),
+        cmocka_unit_test(the_plant_is_as_strong_as_the_guard_believes),
+        cmocka_unit_test(a_file_with_a_zero_byte_is_refused),
         cmocka_unit_test(the_timeout_spans_two_controller_periods),
         cmocka_unit_test(the_start_lies_in_ranges_that_are_not_empty),
         cmocka_unit_test(obstacles_have_ids_of_their_own),

@@ -71,6 +71,8 @@ static void limits_have_three_forms(void **state)
     const struct sample off = accept("number: 1\nlimits: off"), one = accept("number: 1\nlimits: 5");
     assert_true(isinf(off.limits[0]) && isinf(off.limits[1]) && off.limits[0] > 0 && off.limits[1] > 0);
     assert_true(one.limits[0] == 5 && one.limits[1] == 5);
+    const struct sample some = accept("number: 1\nlimits: [off, 5]");
+    assert_true(isinf(some.limits[0]) && some.limits[1] == 5);
 }
 
 // Both ends of a range belong to it; an open end does not.
@@ -175,7 +177,9 @@ static void broken_yaml_is_refused_with_its_line(void **state)
     } broken[] = {{"number: 1\nvector: [1, 2\ninteger: 2\n", "f.yaml:3: not YAML: "},
                   {"number: 1\n\tinteger: 2\n", "f.yaml:2: not YAML: "},
                   {"number: \"1\n", "f.yaml:2: not YAML: "},
-                  {"number: 1\nchoice: *nobody\n", "f.yaml:2: not YAML: "}};
+                  {"number: 1\nchoice: *nobody\n", "f.yaml:2: not YAML: "},
+                  {"number: 1\n---\nnumber: 2\n", "f.yaml: expected one YAML document"},
+                  {"number: 1\n...\n\"", "f.yaml: expected one YAML document"}};
     for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
         struct sample s = defaults();
         const struct sample before = s;
@@ -245,6 +249,7 @@ static void bad_overrides_are_refused(void **state)
     refuse_set("number=", "--set number=: number: expected a number >= -10 and <= 10, found nothing");
     refuse_set("items.0.at=[0, 2]",
                "--set items.0.at=[0, 2]: items.0.at: expected a list of 2 numbers >= -1 and <= 1, found \"2\"");
+    refuse_set("section=", "--set section=: section: expected keys with values, found nothing");
     refuse_set("items=[{}]", "--set items=[{}]: items.0.at: missing key: expected a list of 2 numbers >= -1 and <= 1");
     refuse_set("section={x: 1}", "--set section={x: 1}: section.x: unknown key; known here: inner");
 }

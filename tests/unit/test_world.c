@@ -235,6 +235,45 @@ static void every_number_is_compared(void **state)
     }
 }
 
+// --- order ---
+
+// What a sender has overtaken changes nothing; what it repeats changes nothing but is heard again, so that it ends
+// waiting.
+static void messages_of_a_sender_count_once_and_in_order(void **state)
+{
+    (void)state;
+    static struct lw_world world;
+    memset(&world, 0, sizeof world);
+    const struct lw_obstacle_change first = change(MINE, 4, LW_UPSERT, ball(1, 1), none);
+    const struct lw_obstacle_change second = change(MINE, 5, LW_UPSERT, ball(1, 2), none);
+    const struct lw_obstacle_change other = change(YOURS, 1, LW_UPSERT, ball(2, 7), none);
+    assert_int_equal(lw_world_apply(&world, &second), LW_OK);
+    assert_int_equal(lw_world_apply(&world, &first), LW_E_OLD);
+    assert_int_equal(lw_world_apply(&world, &other), LW_OK);
+    const int64_t version = world.version;
+    assert_int_equal(lw_world_apply(&world, &second), LW_OK);
+    assert_true(world.last.session == MINE && world.last.seq == 5 && world.version == version);
+    assert_near(get(&world, 1).p[0], 2, 0);
+    assert_int_equal(world.count, 2);
+}
+
+// More senders than are remembered: the one heard first is forgotten, nothing else is lost.
+static void old_senders_make_room_for_new_ones(void **state)
+{
+    (void)state;
+    static struct lw_world world;
+    memset(&world, 0, sizeof world);
+    for (int k = 1; k <= LW_SENDERS_MAX + 1; k++) {
+        const struct lw_obstacle_change c = change(1000 + k, 9, LW_UPSERT, ball(k, k), none);
+        assert_int_equal(lw_world_apply(&world, &c), LW_OK);
+    }
+    const struct lw_obstacle_change forgotten = change(1001, 8, LW_UPSERT, ball(1, 50), none);
+    const struct lw_obstacle_change known = change(1003, 8, LW_UPSERT, ball(3, 50), none);
+    assert_int_equal(lw_world_apply(&world, &known), LW_E_OLD);
+    assert_int_equal(lw_world_apply(&world, &forgotten), LW_OK);
+    assert_int_equal(world.count, LW_SENDERS_MAX + 1);
+}
+
 // --- full ---
 
 static void fill(struct lw_world *world, int count)
@@ -260,7 +299,7 @@ static void a_full_world_refuses_whole_changes(void **state)
     apply(&world, YOURS, LW_UPSERT, ball(901, 5), ball(1, 5)); // overwriting needs no room
     assert_near(get(&world, 1).p[0], 5, 0);
     memcpy(&before, &world, sizeof world); // padding too
-    c = change(MINE, 1, LW_UPSERT, ball(2, 8), ball(903, 2));
+    c = change(MINE, INT64_MAX, LW_UPSERT, ball(2, 8), ball(903, 2));
     assert_int_equal(lw_world_apply(&world, &c), LW_E_FULL);
     assert_same_bits(&world, &before, sizeof world);
 }
@@ -323,6 +362,8 @@ int main(void)
         cmocka_unit_test(the_version_counts_real_changes),
         cmocka_unit_test(one_difference_makes_one_version),
         cmocka_unit_test(every_number_is_compared),
+        cmocka_unit_test(messages_of_a_sender_count_once_and_in_order),
+        cmocka_unit_test(old_senders_make_room_for_new_ones),
         cmocka_unit_test(a_full_world_refuses_whole_changes),
         cmocka_unit_test(replace_makes_room_first),
         cmocka_unit_test(random_changes_match_a_plain_model),

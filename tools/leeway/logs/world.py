@@ -117,12 +117,16 @@ def _replay(messages: Obstacles) -> dict[tuple[int, int], list[tuple[int, World]
     """Return the worlds after each message, with its place in the log, by (session, seq)."""
     history: dict[tuple[int, int], list[tuple[int, World]]] = {}
     world: dict[int, Obstacle] = {}
+    newest: dict[int, int] = {}
     for row in range(len(messages)):
-        after = _apply(world, messages, row)
-        if after is None:
-            continue
-        world = after
         key = (int(messages.session[row]), int(messages.seq[row]))
+        before = newest.get(key[0], 0)
+        # Overtaken: the controller refuses it. Repeated: it is heard again and changes nothing.
+        after = world if key[1] == before else _apply(world, messages, row)
+        if key[1] < before or after is None:
+            continue
+        newest[key[0]] = key[1]
+        world = after
         history.setdefault(key, []).append((int(messages.order[row]), tuple(world.values())))
     return history
 
