@@ -211,15 +211,20 @@ def report(
     common: Common,
 ) -> None:
     """Turn logs into one self-contained HTML page with PNG twins of every picture."""
+    analyses = [_analyse(log, common.name) for log in logs]
+    _present(analyses, out or logs[0].with_suffix(".report"), common)
+
+
+def _present(analyses: list[Any], out: Path, common: Common) -> None:
+    """Write the report, print the table and where everything is."""
     from leeway.summary import print_table
 
-    analyses = [_analyse(log, common.name) for log in logs]
-    page = _write_report(analyses, out or logs[0].with_suffix(".report"), common.silent)
+    page = _write_report(analyses, out, common.silent)
     if common.as_json:
         print(json.dumps({"report": str(page), "logs": [a.to_json() for a in analyses]}, indent=2))
     elif not common.quiet:
         print_table(analyses)
-        print(f"report  {page}")
+        print(f"logs    {' '.join(str(a.path) for a in analyses)}\nreport  {page}")
     _exit_with_losses(analyses)
 
 
@@ -392,7 +397,7 @@ def demo(
     common: Common,
 ) -> None:
     """Run the paper's cases C1 to C4 in real time, and make the report that compares them."""
-    from leeway.summary import print_table, scenario
+    from leeway.summary import scenario
 
     cases = ("c1", "c2", "c3", "c4")
     logs = [out / f"{case}.lcm" for case in cases]
@@ -400,13 +405,7 @@ def demo(
         _record(scenario(case), log, [], lockstep, common)[0]
         for case, log in zip(cases, logs, strict=True)
     ]
-    page = _write_report(analyses, out / "report", common.silent)
-    if common.as_json:
-        print(json.dumps({"report": str(page), "logs": [a.to_json() for a in analyses]}, indent=2))
-    elif not common.quiet:
-        print_table(analyses)
-        print(f"logs    {' '.join(str(log) for log in logs)}\nreport  {page}")
-    _exit_with_losses(analyses)
+    _present(analyses, out / "report", common)
 
 
 @command(app, "bench", "leeway bench --json")

@@ -121,6 +121,7 @@ def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> f
 def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> None:
     """Start logger, simulator, controller; the logger records before the others begin."""
     config.log.parent.mkdir(parents=True, exist_ok=True)
+    config.log.unlink(missing_ok=True)  # an old log would pass for the new one's first event
     # A recorder that waits for the processor loses what its short queue cannot hold.
     logger = Child("lcm-logger", "-q", "-f", f"--lcm-url={url}", str(config.log), ahead=True)
     children.append(logger)

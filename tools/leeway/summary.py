@@ -81,8 +81,12 @@ def print_info(analysis: Any) -> None:
     """Print all numbers of a run, then its events."""
     console = Console(highlight=False)
     for key, value in analysis.to_json().items():
-        if key not in ("events", "scene"):
+        if key not in ("events", "scene", "limits"):
             console.print(f"{key:24} {_short(value)}", soft_wrap=True, markup=False)
+    console.print("limits", style="bold")
+    for use in analysis.limits:
+        text = f"{use.share:.1%} used, joint {use.joint} at {use.t:.3f} s" if use.on else "off"
+        console.print(f"  {use.key:22} {text}", soft_wrap=True, markup=False)
     console.print("events", style="bold")
     for event in analysis.events:
         console.print(

@@ -174,7 +174,10 @@ def _set_box(axes: Any, lower: Floats, upper: Floats) -> None:
         (axes.set_xlim, axes.set_ylim, axes.set_zlim), lower, upper, strict=True
     ):
         set_limits(low, high)
-    axes.set_box_aspect(upper - lower, zoom=1.18)
+    # Seen from the side a flat scene may fill the width; a tall one needs its height.
+    size = upper - lower
+    tallness = float(size[2] / np.linalg.norm(size))
+    axes.set_box_aspect(size, zoom=float(np.clip(1.18 - 0.8 * (tallness - 0.4), 0.85, 1.18)))
     for artist in (*axes.lines, *axes.collections):
         artist.set_clip_on(False)  # the square that 3-D axes clip to is smaller than the picture
 
