@@ -41,6 +41,7 @@ struct live {
     struct lw_stamp last_state;        // rx: newest joint state taken
     int64_t world_refused;             // main: changes that did not fit
     atomic_bool stopping;              // main -> rt: brake, then end
+    atomic_bool abandoned;             // main -> rt: end now, a second signal came
     atomic_bool rt_done;               // rt -> main: at rest, or never moved
     atomic_int_fast64_t skipped;       // rt -> main
 };
@@ -126,7 +127,6 @@ static bool find_phase(struct live *live, int64_t *phase_ns)
 
 static void tick(struct live *live, const struct lw_periodic *loop, union lw_message *message)
 {
-    static const struct lw_request stop = {.stamp = {.session = INT64_MAX, .seq = 1}, .kind = LW_REQUEST_STOP};
     bool fresh = false;
     const struct arrival *state = take_state(live);
     const struct lw_world *world = lw_mailbox_take(&live->world_box, &fresh);
@@ -135,7 +135,7 @@ static void tick(struct live *live, const struct lw_periodic *loop, union lw_mes
                                      .state_age_ns = loop->wake_ns - state->arrival_ns,
                                      .joint = &state->joint,
                                      .world = world,
-                                     .request = atomic_load(&live->stopping) ? &stop : request};
+                                     .request = atomic_load(&live->stopping) ? &lw_request_shutdown : request};
     lw_tick(&live->control->config, &live->control->state, &in, &message->joint_command);
 }
 
@@ -159,6 +159,7 @@ static void control(struct live *live, int64_t phase_ns)
         // A lost command is the plant's timeout to handle; the next tick sends another.
         const bool sent = lw_bus_publish(live->rt_bus, LW_CHANNEL_JOINT_COMMAND, &message) == LW_OK;
         ended = atomic_load(&live->stopping) && (!sent || lw_controller_at_rest(&live->control->state));
+        ended |= atomic_load(&live->abandoned);
         exec_ns = lw_clock_mono_ns() - loop.wake_ns;
         atomic_store(&live->skipped, loop.skipped);
     }
@@ -204,6 +205,8 @@ static bool serve(struct live *live)
         ok = ok && lw_bus_handle(live->world_bus, POLL_MS);
         if (lw_stop_signal() != 0 || !ok)
             atomic_store(&live->stopping, true);
+        if (lw_stop_count() > 1)
+            atomic_store(&live->abandoned, true);
     }
     return ok;
 }

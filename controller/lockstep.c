@@ -9,9 +9,11 @@
 // Errors   see control.h.
 #include "controller/control.h"
 
-#include "base/stop.h" // lw_stop_signal
+#include "base/clock.h" // lw_clock_mono_ns
+#include "base/stop.h"  // lw_stop_signal
 
 enum { POLL_MS = 100 };
+static const int64_t quiet_ns = 300 * 1000 * 1000; // without a state for this long, no plant waits for us
 
 struct lockstep {
     struct lw_control *control;
@@ -19,6 +21,7 @@ struct lockstep {
     struct lw_world world;
     struct lw_request request;
     union lw_message command; // last one sent
+    int64_t refused;          // obstacle messages
     int64_t plant_session;    // of the state it answers
     int64_t plant_tick;
 };
@@ -50,8 +53,8 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
     struct lockstep *l = user;
     if (channel == LW_CHANNEL_JOINT_STATE)
         on_joint_state(l, &message->joint_state);
-    else if (channel == LW_CHANNEL_OBSTACLES && lw_world_apply(&l->world, &message->obstacles) != LW_OK)
-        lw_program_say(l->control->program, "more than %d obstacles: a message was refused", LW_WORLD_MAX);
+    else if (channel == LW_CHANNEL_OBSTACLES)
+        l->refused += lw_world_apply(&l->world, &message->obstacles) != LW_OK;
     else if (channel == LW_CHANNEL_GOAL || channel == LW_CHANNEL_STOP)
         l->request = message->request;
 }
@@ -66,6 +69,35 @@ static enum lw_status subscribe(struct lockstep *l)
     return status;
 }
 
+// Whether the program may end: it was asked to, and the arm is at rest, or no plant asks any more.
+static bool may_end(const struct lockstep *l, int64_t *heard_ns, int64_t *last_tick)
+{
+    const struct lw_controller_state *state = &l->control->state;
+    const int64_t now_ns = lw_clock_mono_ns();
+    if (lw_stop_signal() == 0 || state->tick != *last_tick)
+        *heard_ns = now_ns;
+    *last_tick = state->tick;
+    const bool stopped = state->request.kind == LW_REQUEST_STOP && lw_controller_at_rest(state);
+    const bool quiet = now_ns - *heard_ns > quiet_ns;
+    return lw_stop_signal() != 0 && (stopped || quiet || lw_stop_count() > 1);
+}
+
+// Answers states until asked to stop and the arm was braked. False when the bus failed.
+static bool serve(struct lockstep *l)
+{
+    int64_t announce_ns = 0, heard_ns = 0, last_tick = 0;
+    while (!may_end(l, &heard_ns, &last_tick)) {
+        if (lw_stop_signal() != 0)
+            l->request = lw_request_shutdown;
+        lw_program_announce(l->control->program, l->bus, &announce_ns);
+        if (!lw_bus_handle(l->bus, POLL_MS)) {
+            lw_program_fail(l->control->program, "the bus failed");
+            return false;
+        }
+    }
+    return true;
+}
+
 int lw_control_lockstep(struct lw_control *control)
 {
     static struct lockstep lockstep;
@@ -77,15 +109,9 @@ int lw_control_lockstep(struct lw_control *control)
         return 1;
     }
     lw_program_say(control->program, "ready, in lockstep");
-    int64_t announce_ns = 0;
-    while (lw_stop_signal() == 0) {
-        lw_program_announce(control->program, lockstep.bus, &announce_ns);
-        if (!lw_bus_handle(lockstep.bus, POLL_MS)) {
-            lw_program_fail(control->program, "the bus failed");
-            break;
-        }
-    }
-    const bool failed = lw_stop_signal() == 0;
+    const bool ok = serve(&lockstep);
+    lw_program_say(control->program, "%lld ticks, %lld messages refused", (long long)control->state.tick,
+                   (long long)(lockstep.refused + lw_bus_refused(lockstep.bus)));
     lw_bus_close(lockstep.bus);
-    return failed ? 1 : lw_stop_exit_status();
+    return ok ? lw_stop_exit_status() : 1;
 }

@@ -26,6 +26,9 @@ struct lw_request_memory {
     int next; // place of the next new sender: the oldest makes room
 };
 
+// The request to stop that a program makes of itself when it is to end.
+extern const struct lw_request lw_request_shutdown;
+
 // Whether a request is new; then it is remembered. Session 0 is no request. Cost: fixed.
 bool lw_request_is_new(struct lw_request_memory *memory, const struct lw_request *request);
 

@@ -40,13 +40,17 @@ enum lw_status lw_controller_init(struct lw_controller *config, struct lw_contro
 // --- estimate ---
 
 // Adopts the plant's own velocity where the plant does not follow our commands: a new plant, or one that ramps to rest.
+// Once a state: a plant that died while it ramped must not keep us from coming to rest.
 static void estimate(struct lw_controller_state *state, const struct lw_tick_input *in)
 {
-    const bool new_plant = in->joint->stamp.session != state->plant_session;
-    if (new_plant || in->joint->mode != LW_PLANT_MOVING)
+    const struct lw_joint_state *joint = in->joint;
+    const bool new_plant = joint->stamp.session != state->plant_session;
+    const bool new_state = joint->stamp.seq != state->state_seq;
+    if (new_plant || (new_state && joint->mode != LW_PLANT_MOVING))
         for (int j = 0; j < LW_NJ; j++)
-            state->velocity[j] = isfinite(in->joint->qd[j]) ? in->joint->qd[j] : 0.0;
-    state->plant_session = in->joint->stamp.session;
+            state->velocity[j] = isfinite(joint->qd[j]) ? joint->qd[j] : 0.0;
+    state->plant_session = joint->stamp.session;
+    state->state_seq = joint->stamp.seq;
 }
 
 // --- select request ---

@@ -32,6 +32,7 @@ struct lw_controller {
 struct lw_controller_state {
     int64_t tick;                      // ticks so far
     int64_t plant_session;             // plant being controlled, 0 = none yet
+    int64_t state_seq;                 // joint state used last
     double velocity[LW_NJ];            // rad/s, command in force
     struct lw_request request;         // request in force
     struct lw_request_memory requests; // those obeyed before

@@ -57,6 +57,7 @@ enum lw_status lw_batch_run(const struct lw_scene *scene, const struct lw_batch_
         struct lw_joint_command command;
         const int64_t now_ns = arm.tick * plant.period_ns;
         lw_plant_report(&plant, &arm, &joint);
+        joint.stamp.seq = k + 1;
         const struct lw_tick_input in = {.time_ns = now_ns, .joint = &joint, .world = &world, .request = &no_request};
         lw_tick(&config, &state, &in, &command);
         store(result, k, &config, &command);

@@ -13,8 +13,8 @@
 #include "base/periodic.h" // lw_periodic_*
 #include "base/stop.h"     // lw_stop_signal
 
-// lcm-logger's queue holds 30 messages and drops what comes while it is full: at this pace it may sleep for 6 ms.
-enum { RESEND_MS = 100, MESSAGES_PER_S = 5000 };
+enum { RESEND_MS = 100 };
+static const int64_t resend_ns = RESEND_MS * INT64_C(1000000);
 static const int64_t patience_ns = 5 * LW_NS_PER_S; // for an answer, once there was a first one
 
 struct lockstep {
@@ -54,13 +54,19 @@ static bool ask(struct lockstep *l)
     const struct lw_program *program = l->simulation->program;
     l->answered = false;
     l->wanted_since = lw_clock_mono_ns();
+    int64_t publish_ns = l->wanted_since;
     while (!l->answered && lw_stop_signal() == 0) {
-        if (l->started && lw_clock_mono_ns() - l->wanted_since > patience_ns) {
+        const int64_t now_ns = lw_clock_mono_ns();
+        if (l->started && now_ns - l->wanted_since > patience_ns) {
             lw_program_fail(program, "no answer from the controller for 5 s at t = %.3f s",
                             (double)l->simulation->arm.tick * l->simulation->plant.period_s);
             return false;
         }
-        if (publish(l) != LW_OK || !lw_bus_handle(l->bus, RESEND_MS)) {
+        // Again only after a while: other messages than the answer end the wait, too.
+        const bool due = now_ns >= publish_ns;
+        if (due)
+            publish_ns = now_ns + resend_ns;
+        if ((due && publish(l) != LW_OK) || !lw_bus_handle(l->bus, RESEND_MS)) {
             lw_program_fail(program, "the bus failed");
             return false;
         }
@@ -87,6 +93,18 @@ static bool step(struct lockstep *l)
     return true;
 }
 
+// Asked to stop in mid-motion: ramps to rest by itself, as when commands cease.
+static void come_to_rest(struct lockstep *l)
+{
+    struct lw_simulation *s = l->simulation;
+    lw_plant_stop(&s->arm);
+    while (!lw_plant_at_rest(&s->arm)) {
+        lw_plant_step(&s->plant, &s->arm, s->arm.tick * s->plant.period_ns);
+        if (lw_simulation_publish_state(s, l->bus) != LW_OK)
+            return;
+    }
+}
+
 int lw_simulation_lockstep(struct lw_simulation *simulation)
 {
     static struct lockstep lockstep;
@@ -97,7 +115,7 @@ int lw_simulation_lockstep(struct lw_simulation *simulation)
     bool ok = lw_program_subscribe(program, lockstep.bus, LW_CHANNEL_JOINT_COMMAND, on_command, &lockstep) == LW_OK;
     if (ok)
         lw_program_say(program, "waiting for leeway-controller --lockstep %s", program->path);
-    const int64_t pace_ns = (lw_scene_plant_ratio(&program->scene) + 1) * LW_NS_PER_S / MESSAGES_PER_S;
+    const int64_t pace_ns = (lw_scene_plant_ratio(&program->scene) + 1) * LW_NS_PER_S / program->pace;
     struct lw_periodic pace = lw_periodic_start(lw_clock_mono_ns(), pace_ns);
     int64_t announce_ns = 0;
     bool done = false;
@@ -109,6 +127,8 @@ int lw_simulation_lockstep(struct lw_simulation *simulation)
     }
     if (ok)
         lw_program_say(program, "done, %.3f s of motion", (double)simulation->arm.tick * simulation->plant.period_s);
+    if (lw_stop_signal() != 0)
+        come_to_rest(&lockstep);
     lw_bus_close(lockstep.bus);
     return ok || lw_stop_signal() != 0 ? lw_stop_exit_status() : 1;
 }

@@ -34,7 +34,7 @@ int main(int argc, char **argv)
                    "Example, in two terminals:\n"
                    "  leeway-simulator scenarios/c1.yaml\n"
                    "  leeway-controller scenarios/c1.yaml",
-        .has_until_done = true,
+        .is_simulator = true,
     };
     static struct lw_simulation simulation = {.program = &program};
     lw_program_start(&program, argc, argv);

@@ -45,7 +45,8 @@ static enum lw_status refuse(struct reader *r, const struct value *at, const cha
 {
     char where[256], what[384];
     if (at->set >= 0)
-        snprintf(where, sizeof where, "--set %s", r->source->set[at->set]);
+        snprintf(where, sizeof where, "--set %.100s%s", r->source->set[at->set],
+                 strlen(r->source->set[at->set]) > 100 ? "..." : "");
     else
         snprintf(where, sizeof where, "%s:%d", r->source->name, lw_tree_line(at->node));
     va_list args;
@@ -310,7 +311,7 @@ static enum lw_status check_sets_used(struct reader *r)
         if (strchr(r->source->set[i], '=') == NULL)
             return refuse(r, &at, "expected KEY=VALUE, as in --set law.gamma=2");
         if (!r->set_used[i])
-            return refuse(r, &at, "unknown key; --help-scene lists all of them");
+            return refuse(r, &at, "unknown key; `leeway keys` lists all of them");
     }
     return LW_OK;
 }

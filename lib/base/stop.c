@@ -13,10 +13,12 @@
 #include <stddef.h> // NULL
 
 static volatile sig_atomic_t stop_signal;
+static volatile sig_atomic_t stop_count;
 
 static void note(int signal)
 {
     stop_signal = signal;
+    stop_count = stop_count + 1;
 }
 
 void lw_stop_install(void)
@@ -26,11 +28,17 @@ void lw_stop_install(void)
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGHUP, &action, NULL);
 }
 
 int lw_stop_signal(void)
 {
     return (int)stop_signal;
+}
+
+int lw_stop_count(void)
+{
+    return (int)stop_count;
 }
 
 int lw_stop_exit_status(void)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Stop: SIGINT and SIGTERM as a flag that a program's main loop looks at.
+// Stop: SIGINT, SIGTERM and SIGHUP as a flag that a program's main loop looks at.
 //
 // Units    none.
 // Frames   none.
@@ -9,11 +9,12 @@
 #ifndef LW_BASE_STOP_H
 #define LW_BASE_STOP_H
 
-// Catches SIGINT and SIGTERM from now on.
+// Catches SIGINT, SIGTERM and SIGHUP from now on.
 void lw_stop_install(void);
 
-// Signal that asked to stop, 0 = none yet.
+// Signal that asked to stop, 0 = none yet; and how many came.
 int lw_stop_signal(void);
+int lw_stop_count(void);
 
 // Exit status of a program that ended in good order: 130 after SIGINT, as shells expect, else 0.
 int lw_stop_exit_status(void);

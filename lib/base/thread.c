@@ -11,13 +11,22 @@
 
 #include <sched.h>    // SCHED_FIFO
 #include <stddef.h>   // size_t
-#include <sys/mman.h> // mlockall
+#include <sys/mman.h> // mlockall, mmap
 
-enum { PREFAULT_BYTES = 256 * 1024, PAGE_BYTES = 4096 };
+enum { PREFAULT_BYTES = 256 * 1024, PAGE_BYTES = 4096, TRIAL_BYTES = 64 * 1024 * 1024 };
 
 bool lw_thread_lock_memory(void)
 {
-    return mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+        return false;
+    // Under a small memlock limit the call succeeds, and then no thread gets a stack: try what threads will need.
+    void *trial = mmap(NULL, TRIAL_BYTES, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (trial == MAP_FAILED) {
+        munlockall();
+        return false;
+    }
+    munmap(trial, TRIAL_BYTES);
+    return true;
 }
 
 bool lw_thread_set_priority(int priority)

@@ -24,7 +24,7 @@
 
 #include <leeway_scene_t.h>
 
-enum { CHANNEL_NAME_MAX = 64, NAME_MAX_LENGTH = 32, QUEUE_CAPACITY = 64 };
+enum { CHANNEL_NAME_MAX = 64, NAME_BYTES = LW_NAME_MAX + 2, QUEUE_CAPACITY = 64 };
 
 static const char default_url[] = "udpm://239.255.76.67:7667?ttl=0";
 
@@ -38,7 +38,7 @@ struct subscription {
 struct lw_bus {
     lcm_t *lcm;
     int64_t session;
-    char name[NAME_MAX_LENGTH];
+    char name[NAME_BYTES];
     char channel_name[LW_CHANNEL_COUNT][CHANNEL_NAME_MAX];
     int64_t seq[LW_CHANNEL_COUNT];
     int64_t scene_seq;
@@ -63,7 +63,8 @@ static bool parse_url(const char *url, struct sockaddr_in *address)
     snprintf(host, sizeof host, "%.*s", (int)(colon - start), start);
     const unsigned long port = strtoul(colon + 1, NULL, 10);
     *address = (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
-    return port > 0 && port <= UINT16_MAX && inet_pton(AF_INET, host, &address->sin_addr) == 1;
+    return port > 0 && port <= UINT16_MAX && inet_pton(AF_INET, host, &address->sin_addr) == 1 &&
+           IN_MULTICAST(ntohl(address->sin_addr.s_addr));
 }
 
 // Asks the kernel for a route before LCM does, which would print a page of its own.
@@ -84,7 +85,8 @@ static enum lw_status check_url(const char *url, struct lw_error *error)
     struct sockaddr_in address;
     if (!parse_url(url, &address)) {
         snprintf(error->text, sizeof error->text,
-                 "LCM URL: expected udpm://ADDRESS:PORT?ttl=N, as in %s, found \"%.100s\"", default_url, url);
+                 "LCM URL: expected udpm://GROUP:PORT?ttl=N with a multicast group, as in %s, found \"%.100s\"",
+                 default_url, url);
         return LW_E_BUS;
     }
     if (!has_route(&address)) {

@@ -14,6 +14,10 @@
 
 #include <stdint.h> // int64_t
 
+// A robot's name is part of channel names, which LCM reads as regular expressions.
+enum { LW_NAME_MAX = 30 };
+#define LW_NAME_LETTERS "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-"
+
 struct lw_bus;
 
 // How to open a bus.

@@ -20,7 +20,8 @@
 #include <string.h>  // memcpy
 
 static const double workspace = 100; // m, positions beyond this are refused
-static const double speed_max = 100; // rad/s, speeds beyond this are refused
+static const double joint_max = 1e6; // rad and rad/s, beyond this no number is meant
+static const int64_t period_max_ns = 1000 * 1000 * 1000;
 
 // --- stamp ---
 
@@ -66,10 +67,10 @@ static int encode_joint_state(void *data, const union lw_message *message)
     return leeway_joint_state_t_encode(data, 0, LW_WIRE_MAX, &w);
 }
 
-// tick * period_ns is a time of motion: not negative, and it fits.
+// tick * period_ns is a time of motion: not negative, and it fits. No plant is slower than 1 Hz.
 static bool is_time(int64_t tick, int64_t period_ns)
 {
-    return period_ns > 0 && tick >= 0 && tick <= INT64_MAX / period_ns;
+    return period_ns > 0 && period_ns <= period_max_ns && tick >= 0 && tick <= INT64_MAX / period_ns;
 }
 
 static enum lw_status decode_joint_state(const void *data, int size, union lw_message *message)
@@ -91,9 +92,9 @@ static enum lw_status decode_joint_state(const void *data, int size, union lw_me
     if (status == LW_OK && !is_time(w.tick, w.period_ns))
         status = LW_E_ARGUMENT;
     if (status == LW_OK)
-        status = check_values(s.q, LW_NJ, speed_max);
+        status = check_values(s.q, LW_NJ, joint_max);
     if (status == LW_OK)
-        status = check_values(s.qd, LW_NJ, speed_max);
+        status = check_values(s.qd, LW_NJ, joint_max);
     if (status == LW_OK)
         message->joint_state = s;
     return status;
@@ -150,10 +151,10 @@ static enum lw_status decode_joint_command(const void *data, int size, union lw_
                                  .world = {.session = w.world_session, .seq = w.world_seq}};
     memcpy(c.qd, w.qd, sizeof c.qd);
     enum lw_status status = check_stamp(&c.stamp);
-    if (status == LW_OK && (w.mode < LW_COMMAND_IDLE || w.mode > LW_COMMAND_VELOCITY))
+    if (status == LW_OK && (w.mode < LW_COMMAND_IDLE || w.mode > LW_COMMAND_VELOCITY || w.state_tick < 0))
         status = LW_E_ARGUMENT;
     if (status == LW_OK)
-        status = check_values(c.qd, LW_NJ, speed_max);
+        status = check_values(c.qd, LW_NJ, joint_max);
     if (status == LW_OK)
         message->joint_command = c;
     return status;

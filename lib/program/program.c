@@ -14,16 +14,23 @@
 #include "base/thread.h" // lw_thread_*
 
 #include <argp.h>   // argp_parse
+#include <limits.h> // INT_MAX
 #include <stdarg.h> // va_list
 #include <stdlib.h> // exit
+#include <string.h> // strspn
 
-enum { EXIT_FAILED = 1, EXIT_USAGE = 2, KEY_URL = 256, KEY_HELP_SCENE, KEY_UNTIL_DONE };
+enum { EXIT_FAILED = 1, EXIT_USAGE = 2, KEY_URL = 256, KEY_HELP_SCENE, KEY_UNTIL_DONE, KEY_PACE };
 
 const char *argp_program_version = LW_BUILD;
 
-// The first one is the simulator's alone: the controller's table starts behind it.
+// lcm-logger's queue holds 30 messages and drops what comes while it is full: at this pace it may sleep for 10 ms.
+enum { PACE = 3000 };
+
+// The first two are the simulator's alone: the controller's table starts behind them.
+enum { SIMULATOR_OPTIONS = 2 };
 static const struct argp_option argp_options[] = {
     {"until-done", KEY_UNTIL_DONE, NULL, 0, "End after the scene's duration_s instead of running until stopped.", 0},
+    {"pace", KEY_PACE, "N", 0, "In lockstep, N messages a second at most, so that a recorder can follow (3000).", 0},
     {"set", 's', "KEY=VALUE", 0, "Replace a key of the scene, as in --set law.gamma=2. Repeatable.", 0},
     {"lcm-url", KEY_URL, "URL", 0, "LCM bus. Default: $LCM_DEFAULT_URL, else multicast that stays on this host.", 0},
     {"name", 'n', "NAME", 0, "Robot's name: its channels become NAME_JOINT_STATE and so on.", 0},
@@ -34,6 +41,25 @@ static const struct argp_option argp_options[] = {
     {0}};
 
 // NOLINTBEGIN(concurrency-mt-unsafe): argp and exit are called before any thread starts
+
+static void parse_name(struct lw_program *program, const char *text, struct argp_state *state)
+{
+    const size_t length = strlen(text);
+    if (length == 0 || length > LW_NAME_MAX || strspn(text, LW_NAME_LETTERS) != length)
+        argp_error(state, "--name: expected 1 to %d letters, digits, _ or -, found \"%s\"", LW_NAME_MAX, text);
+    else
+        program->bus_config.name = text;
+}
+
+static void parse_pace(struct lw_program *program, const char *text, struct argp_state *state)
+{
+    char *end = NULL;
+    const long pace = strtol(text, &end, 10);
+    if (end == text || *end != '\0' || pace < 1 || pace > INT_MAX)
+        argp_error(state, "--pace: expected a whole number > 0, found \"%s\"", text);
+    else
+        program->pace = (int)pace;
+}
 
 static error_t parse_option(int key, char *arg, struct argp_state *state)
 {
@@ -46,10 +72,11 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
             argp_error(state, "more than %d --set", LW_SETS_MAX);
         break;
     case KEY_URL: program->bus_config.url = arg; break;
-    case 'n': program->bus_config.name = arg; break;
+    case 'n': parse_name(program, arg, state); break;
     case 'l': program->lockstep = true; break;
     case 'q': program->quiet = true; break;
     case KEY_UNTIL_DONE: program->until_done = true; break;
+    case KEY_PACE: parse_pace(program, arg, state); break;
     case KEY_HELP_SCENE: lw_scene_describe(stdout); exit(0);
     case ARGP_KEY_ARG:
         if (program->path != NULL)
@@ -79,9 +106,15 @@ static char *scene_text(const struct lw_scene *scene)
 
 static void parse_command_line(struct lw_program *program, int argc, char **argv)
 {
-    const struct argp argp = {
-        argp_options + (program->has_until_done ? 0 : 1), parse_option, "SCENE", program->summary, NULL, NULL, NULL};
+    const struct argp argp = {argp_options + (program->is_simulator ? 0 : SIMULATOR_OPTIONS),
+                              parse_option,
+                              "SCENE",
+                              program->summary,
+                              NULL,
+                              NULL,
+                              NULL};
     argp_err_exit_status = EXIT_USAGE;
+    program->pace = PACE;
     argp_parse(&argp, argc, argv, 0, NULL, program);
 }
 
@@ -169,7 +202,8 @@ void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, i
 
 void lw_program_go_realtime(const struct lw_program *program, int priority)
 {
-    if (!lw_thread_lock_memory() || !lw_thread_set_priority(priority))
+    const bool locked = lw_thread_lock_memory(), prioritised = lw_thread_set_priority(priority);
+    if (!locked || !prioritised)
         lw_program_say(program, "no real-time priority or locked memory (needs root, or limits rtprio and memlock): "
                                 "deadlines depend on what else this machine does");
 }

@@ -20,7 +20,7 @@ struct lw_program {
     // Set by the program itself.
     const char *name;
     const char *summary; // for --help, with an example
-    bool has_until_done; // knows --until-done
+    bool is_simulator;   // knows --until-done and --pace
 
     // From the command line.
     const char *path; // scene file
@@ -28,6 +28,7 @@ struct lw_program {
     int set_count;
     bool lockstep;
     bool until_done; // end after the scene's duration
+    int pace;        // messages per second in lockstep
     bool quiet;
     struct lw_bus_config bus_config;
 

@@ -73,6 +73,9 @@ static enum lw_status check_plant(const struct lw_scene *scene, const struct lw_
 
 static enum lw_status check_rates(const struct lw_scene *scene, const struct lw_source *source, struct lw_error *error)
 {
+    if (lw_scene_steps(scene) < 1)
+        return refuse(error, source, "duration_s: expected at least one controller period, %g s, found %g",
+                      1 / scene->rate_hz, scene->duration_s);
     const double ratio = scene->plant.rate_hz / scene->rate_hz;
     if (ratio < 1 || fabs(ratio - round(ratio)) > 1e-9)
         return refuse(error, source, "plant.rate_hz: expected a whole multiple of rate_hz = %g, found %g",

@@ -41,7 +41,7 @@ static const struct lw_key limit_keys[] = {
 static const struct lw_key plant_keys[] = {
     {.name = "rate_hz", RATE, .min = 0, AT(plant.rate_hz),
      .help = "own rate of the plant, a whole multiple of the top-level rate_hz; 0 = the same"},
-    {.name = "timeout_s", .kind = LW_NUMBER, AT(plant.timeout_s), POSITIVE, .unit = "s",
+    {.name = "timeout_s", .kind = LW_NUMBER, AT(plant.timeout_s), .min = 0, .above_min = true, .max = 60, .unit = "s",
      .help = "without a command for this long the plant ramps to rest"},
     {.name = "velocity", LIMITS("rad/s"), AT(plant.velocity), .help = "joint speed limit of the plant"},
     {.name = "acceleration", LIMITS("rad/s^2"), AT(plant.acceleration),

@@ -185,3 +185,24 @@ def test_help_has_an_example():
         result = leeway(*command, "--help")
         assert result.returncode == 0
         assert command == [] or "Example: leeway" in result.stdout
+
+
+@pytest.mark.parametrize("name", ["a+b", "a(b", "", "x" * 31, "Ärm"])
+def test_robot_names_are_no_patterns(root, tmp_path, name):
+    result = leeway("run", root / SCENE, "--log", tmp_path / "run.lcm", "--name", name)
+    assert result.returncode == 2
+    assert "1 to 30 letters" in " ".join(result.stderr.split())
+    command = [program("leeway-controller"), root / SCENE, "--name", name]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+    assert result.returncode == 2
+    assert "1 to 30 letters" in result.stderr
+
+
+@pytest.mark.usefixtures("private_network")
+def test_logs_that_cannot_be_written(root, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("precious")
+    for log in (blocked / "run.lcm", tmp_path):
+        result = leeway("run", root / SCENE, "--log", log, "--force")
+        _assert_refused(result, 1, "cannot write the log")
+    assert blocked.read_text() == "precious"

@@ -1,10 +1,11 @@
 """Two processes in lockstep over LCM give the numbers of the in-process run, bit for bit."""
 
 import json
+import signal
 
 import numpy as np
 import pytest
-from helpers import leeway, motion, read
+from helpers import Listener, leeway, motion, read, start_leeway
 
 import leeway as package
 
@@ -69,3 +70,28 @@ def test_several_robots_share_a_bus(root, tmp_path):
     result = leeway("run", scene, "--lockstep", "--log", log, "--name", "ARM1", "--json")
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["final_deviation"] == pytest.approx(0.242363, abs=1e-6)
+
+
+@pytest.mark.usefixtures("private_network")
+def test_ctrl_c_brings_the_arm_to_rest_first(root, tmp_path):
+    log = tmp_path / "run.lcm"
+    options = ["--lockstep", "--set=duration_s=600", "--log", log]
+    process = start_leeway("run", root / "scenarios" / "reach.yaml", *options)
+    try:
+        Listener().wait_for("JOINT_STATE", lambda s: max(map(abs, s.qd)) > 0.05, seconds=20)
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=10)[1]
+    finally:
+        if process.poll() is None:
+            process.kill()
+    assert process.returncode == 130, said
+    assert "brought to rest" in said
+    assert not any(read(log, "JOINT_STATE")[-1].qd)
+
+
+@pytest.mark.usefixtures("private_network")
+def test_fast_commands_are_the_same_on_the_bus(root, tmp_path):
+    log, expected = _run(root, tmp_path, "c4", "law.k_a=1000", "duration_s=0.4")
+    q, _ = motion(log)
+    assert abs(expected.qd).max() > 100
+    np.testing.assert_array_equal(q, expected.q)

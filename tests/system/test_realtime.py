@@ -2,6 +2,8 @@
 
 import json
 import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -204,3 +206,46 @@ def test_an_old_log_does_not_pass_for_the_new_one(root, tmp_path):
     result = leeway("run", scene, "--log", log, "--force", "--lockstep", "--set=duration_s=0.1")
     assert result.returncode == 0, result.stderr
     assert {s.program for s in read(log, "SCENE")} == {"leeway-controller", "leeway-simulator"}
+
+
+def test_a_second_run_on_the_same_bus_is_refused(root, tmp_path):
+    scene = root / "scenarios" / "c1.yaml"
+    with running("leeway-simulator", scene):
+        Listener().wait_for("JOINT_STATE", lambda s: True)
+        result = leeway("run", scene, "--log", tmp_path / "run.lcm")
+    assert result.returncode == 1
+    assert "another run is on this bus" in result.stderr
+    assert not (tmp_path / "run.lcm").exists()
+
+
+def test_a_plant_that_died_while_ramping_does_not_keep_the_controller(root):
+    scene = root / "scenarios" / "reach.yaml"
+    slow = ["--set=limits.acceleration=0.2", "--set=plant.acceleration=0.2"]
+    with (
+        running("leeway-controller", scene, *slow) as controller,
+        running("leeway-simulator", scene, *slow) as simulator,
+    ):
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", lambda s: max(map(abs, s.qd)) > 0.1)
+        simulator.send_signal(signal.SIGTERM)  # ramps for half a second and more
+        listener.wait_for("JOINT_STATE", lambda s: s.plant_mode == s.STOPPING)
+        kill(simulator.pid)
+        controller.send_signal(signal.SIGINT)
+        assert controller.wait(5) == 130
+
+
+def test_a_small_memory_lock_limit_is_told_and_survived(root, tmp_path):
+    scene = root / "scenarios" / "c1.yaml"
+    limits = [
+        "prlimit",
+        "--memlock=8388608:8388608",
+        "setpriv",
+        "--bounding-set=-all",
+        "--inh-caps=-all",
+    ]
+    options = ["--log", tmp_path / "run.lcm", "--set=duration_s=0.5"]
+    command = [*limits, sys.executable, "-m", "leeway", "run", scene, *options]
+    result = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert result.returncode == 0, result.stderr

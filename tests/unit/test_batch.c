@@ -44,7 +44,7 @@ static enum lw_status run_scene(const struct lw_scene *scene, struct run *run)
 static void there_is_one_row_a_step_and_one_more(void **state)
 {
     (void)state;
-    static const char *const durations[] = {"duration_s=8", "duration_s=0.008", "duration_s=0.003", "duration_s=1.5"};
+    static const char *const durations[] = {"duration_s=8", "duration_s=0.008", "duration_s=0.012", "duration_s=1.5"};
     for (int i = 0; i < 4; i++) {
         const struct lw_scene scene = load("c1.yaml", &durations[i], 1);
         static struct run run, pattern;

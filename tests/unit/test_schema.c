@@ -240,11 +240,11 @@ static void overrides_satisfy_required_keys(void **state)
 static void bad_overrides_are_refused(void **state)
 {
     (void)state;
-    refuse_set("nubmer=2", "--set nubmer=2: unknown key; --help-scene lists all of them");
+    refuse_set("nubmer=2", "--set nubmer=2: unknown key; `leeway keys` lists all of them");
     refuse_set("number", "--set number: expected KEY=VALUE, as in --set law.gamma=2");
-    refuse_set("numbe=2", "--set numbe=2: unknown key; --help-scene lists all of them");
-    refuse_set("=2", "--set =2: unknown key; --help-scene lists all of them");
-    refuse_set("items.1.id=2", "--set items.1.id=2: unknown key; --help-scene lists all of them");
+    refuse_set("numbe=2", "--set numbe=2: unknown key; `leeway keys` lists all of them");
+    refuse_set("=2", "--set =2: unknown key; `leeway keys` lists all of them");
+    refuse_set("items.1.id=2", "--set items.1.id=2: unknown key; `leeway keys` lists all of them");
     refuse_set("number=11", "--set number=11: number: expected a number >= -10 and <= 10, found \"11\"");
     refuse_set("number=", "--set number=: number: expected a number >= -10 and <= 10, found nothing");
     refuse_set("items.0.at=[0, 2]",

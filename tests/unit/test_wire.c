@@ -270,9 +270,9 @@ static void every_double_is_checked(void **state)
     union lw_message s = make(&random, LW_CHANNEL_JOINT_STATE), c = make(&random, LW_CHANNEL_JOINT_COMMAND);
     union lw_message g = make(&random, LW_CHANNEL_GOAL), o = make(&random, LW_CHANNEL_OBSTACLES);
     for (int j = 0; j < LW_NJ; j++) {
-        check_double(LW_CHANNEL_JOINT_STATE, &s, &s.joint_state.q[j], 100);
-        check_double(LW_CHANNEL_JOINT_STATE, &s, &s.joint_state.qd[j], 100);
-        check_double(LW_CHANNEL_JOINT_COMMAND, &c, &c.joint_command.qd[j], 100);
+        check_double(LW_CHANNEL_JOINT_STATE, &s, &s.joint_state.q[j], 1e6);
+        check_double(LW_CHANNEL_JOINT_STATE, &s, &s.joint_state.qd[j], 1e6);
+        check_double(LW_CHANNEL_JOINT_COMMAND, &c, &c.joint_command.qd[j], 1e6);
     }
     o.obstacles.op = LW_UPSERT;
     o.obstacles.count = LW_CHANGE_MAX;

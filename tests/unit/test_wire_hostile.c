@@ -111,6 +111,21 @@ static void ticks_that_are_no_time_are_refused(void **state)
     }
 }
 
+// A command from before the first state is no answer to any, and its age would overflow.
+static void commands_from_before_time_are_refused(void **state)
+{
+    (void)state;
+    struct random random = {92};
+    static const int64_t bad[] = {-1, INT64_MIN};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        unsigned char data[LW_WIRE_MAX];
+        union lw_message m = make(&random, LW_CHANNEL_JOINT_COMMAND), out;
+        m.joint_command.state_tick = bad[i];
+        const uint32_t size = lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &m, data);
+        assert_int_equal(decode(LW_CHANNEL_JOINT_COMMAND, data, size, &out), LW_E_ARGUMENT);
+    }
+}
+
 // --- random bytes ---
 
 static bool within(const double *values, int n, double limit)
@@ -135,8 +150,8 @@ static bool obstacles_keep_their_ranges(const struct lw_obstacle_change *c)
 
 static bool state_keeps_its_ranges(const struct lw_joint_state *s)
 {
-    return within(s->q, LW_NJ, 100) && within(s->qd, LW_NJ, 100) && (unsigned)s->mode <= LW_PLANT_STOPPING &&
-           s->period_ns > 0;
+    return within(s->q, LW_NJ, 1e6) && within(s->qd, LW_NJ, 1e6) && (unsigned)s->mode <= LW_PLANT_STOPPING &&
+           s->period_ns > 0 && s->period_ns <= 1000000000 && s->tick >= 0;
 }
 
 // What every accepted message promises.
@@ -147,7 +162,7 @@ static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
     switch (channel) {
     case LW_CHANNEL_JOINT_STATE: return stamped && state_keeps_its_ranges(&m->joint_state);
     case LW_CHANNEL_JOINT_COMMAND:
-        return stamped && within(c->qd, LW_NJ, 100) && (unsigned)c->mode <= LW_COMMAND_VELOCITY;
+        return stamped && c->state_tick >= 0 && within(c->qd, LW_NJ, 1e6) && (unsigned)c->mode <= LW_COMMAND_VELOCITY;
     case LW_CHANNEL_OBSTACLES: return stamped && obstacles_keep_their_ranges(&m->obstacles);
     case LW_CHANNEL_GOAL: return stamped && within(m->request.goal, 3, 100);
     case LW_CHANNEL_STOP:
@@ -211,6 +226,7 @@ int main(void)
         cmocka_unit_test(ids_are_positive_and_unique),
         cmocka_unit_test(unused_values_are_ignored),
         cmocka_unit_test(ticks_that_are_no_time_are_refused),
+        cmocka_unit_test(commands_from_before_time_are_refused),
         cmocka_unit_test(random_bytes_are_never_accepted),
         cmocka_unit_test(damaged_messages_are_refused_or_harmless),
     };

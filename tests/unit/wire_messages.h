@@ -46,10 +46,10 @@ static inline void make_command(struct random *random, struct lw_joint_command *
     c->flags = (unsigned)random_below(random, 128);
     c->plant_session = any_int(random);
     c->state_seq = any_int(random);
-    c->state_tick = any_int(random);
+    c->state_tick = any_int(random) & INT64_MAX;
     c->state_mono_ns = any_int(random);
     c->world = (struct lw_stamp){0, 0, any_int(random), any_int(random)};
-    fill(random, 100, c->qd, LW_NJ);
+    fill(random, 1e6, c->qd, LW_NJ);
 }
 
 static inline void make_obstacles(struct random *random, struct lw_obstacle_change *c)
@@ -78,8 +78,8 @@ static inline union lw_message make(struct random *random, enum lw_channel chann
         m.joint_state.command_seq = any_int(random);
         m.joint_state.tick = random_below(random, 1000000);
         m.joint_state.period_ns = 1 + random_below(random, 1000000000);
-        fill(random, 100, m.joint_state.q, LW_NJ);
-        fill(random, 100, m.joint_state.qd, LW_NJ);
+        fill(random, 1e6, m.joint_state.q, LW_NJ);
+        fill(random, 1e6, m.joint_state.qd, LW_NJ);
         break;
     case LW_CHANNEL_JOINT_COMMAND: make_command(random, &m.joint_command); break;
     case LW_CHANNEL_OBSTACLES: make_obstacles(random, &m.obstacles); break;

@@ -9,7 +9,8 @@ Units are SI, angles radians; positions are in the base frame of the arm (its DH
 (4, 4)
 """
 
-from leeway._native import BUILD, Arm
+from leeway._native import BUILD
+from leeway.arm import Arm
 from leeway.logs.log import read_log
 from leeway.scene import Run, Scene, load_scene, simulate
 

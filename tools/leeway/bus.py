@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import re
 import secrets
@@ -41,6 +42,13 @@ def resolve_url(url: str | None) -> str:
     return f"{DEFAULT_URL}&recv_buf_size={min(RECEIVE_BUFFER, granted)}"
 
 
+def _is_group(address: str) -> bool:
+    try:
+        return ipaddress.IPv4Address(address).is_multicast
+    except ValueError:
+        return False
+
+
 def open_bus(url: str) -> lcm.LCM:
     """Open a bus.
 
@@ -49,10 +57,11 @@ def open_bus(url: str) -> lcm.LCM:
     BusError
         The URL is not of the form udpm://ADDRESS:PORT, or there is no multicast route.
     """
-    match = re.fullmatch(r"udpm://([0-9.]+):(\d+)(\?.*)?", url)
-    if match is None:
+    match = re.fullmatch(r"udpm://([0-9.]+):(\d{1,5})(\?.*)?", url)
+    if match is None or not _is_group(match[1]) or not 0 < int(match[2]) < 1 << 16:
         raise BusError(
-            f'LCM URL: expected udpm://ADDRESS:PORT?ttl=N, as in {DEFAULT_URL}, found "{url}"'
+            "LCM URL: expected udpm://GROUP:PORT?ttl=N with a multicast group, "
+            f'as in {DEFAULT_URL}, found "{url}"'
         )
     try:
         # Ask the kernel for a route before LCM does, which would print a page of its own.

@@ -1,18 +1,20 @@
 """The command line `leeway`. Commands parse, call, print; the work is done in their modules."""
 
-import functools
-import inspect
 import json
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-EXIT_FAILED, EXIT_USAGE, EXIT_LOSS, EXIT_INTERRUPTED = 1, 2, 3, 130
+from leeway.options import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_USAGE, Common, command, fail
+
+if TYPE_CHECKING:
+    from leeway.run import RunConfig
+
 RECORD_TRIES = 3
 
 app = typer.Typer(
@@ -41,49 +43,6 @@ SetOption = Annotated[
 AtOption = Annotated[
     tuple[float, float, float], typer.Option("--at", metavar="X Y Z", help="Centre, m, base frame.")
 ]
-
-
-@dataclass(frozen=True)
-class Common:
-    """Options that every command has."""
-
-    url: Annotated[str | None, typer.Option("--lcm-url", metavar="URL", help="LCM bus.")] = None
-    name: Annotated[str | None, typer.Option("--name", "-n", help="Robot's channel prefix.")] = None
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Errors only.")] = False
-
-    @property
-    def silent(self) -> bool:
-        """No progress for people: quiet, or JSON asked for."""
-        return self.quiet or self.as_json
-
-
-def command(group: typer.Typer, name: str, example: str, **settings: Any) -> Callable[..., Any]:
-    """Register a command: its own parameters, then the common ones, handed over as `common`."""
-
-    def register(function: Callable[..., None]) -> Callable[..., None]:
-        own = [p for p in inspect.signature(function).parameters.values() if p.name != "common"]
-        shared = list(inspect.signature(Common).parameters.values())
-
-        @functools.wraps(function)
-        def call(**values: Any) -> None:
-            common = Common(**{p.name: values.pop(p.name) for p in shared})
-            function(common=common, **values)
-
-        call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in own + shared]
-        )
-        call.__annotations__ = {p.name: p.annotation for p in own + shared}
-        group.command(name, epilog=f"Example: {example}", **settings)(call)
-        return function
-
-    return register
-
-
-def fail(message: str, status: int = EXIT_FAILED) -> NoReturn:
-    """Print one message to stderr and end."""
-    print(f"leeway: {message}", file=sys.stderr)
-    raise typer.Exit(status)
 
 
 def _load(path: Path, sets: list[str] | None) -> Any:
@@ -151,29 +110,48 @@ def _missing(analysis: Any) -> int:
 def _record(
     path: Path, log: Path, sets: list[str], lockstep: bool, common: Common
 ) -> tuple[Any, float]:
-    """Run one scene and read its log; a lockstep run whose log lacks something is run again."""
+    """Run one scene and read its log.
+
+    A lockstep run whose log lacks something is run again, at half the pace: the result is the same.
+    """
+    from leeway.run import RunConfig
+
+    config = RunConfig(_load(path, sets), path, log, sets, lockstep, common.url, common.name)
     for _ in range(RECORD_TRIES if lockstep else 1):
-        wall = _run_one(path, log, sets, lockstep, common)
+        wall = _run_one(config, common)
         analysis = _analyse(log, common.name)
         if not _missing(analysis):
             break
+        config = replace(config, pace=config.pace // 2)
     return analysis, wall
 
 
-def _run_one(path: Path, log: Path, sets: list[str], lockstep: bool, common: Common) -> float:
+def _ending(log: Path, common: Common) -> str:
+    """Say whether the arm is at rest at the end of a log."""
+    from leeway.logs.analysis import analyse
+    from leeway.logs.log import LogError, read_log
+
+    try:
+        moving = bool(analyse(read_log(log, common.name)).plant_qd[-1].any())
+    except LogError:
+        return "the arm had not moved yet"
+    return "the arm was still moving" if moving else "the arm was brought to rest"
+
+
+def _run_one(config: "RunConfig", common: Common) -> float:
     """Run one scene with a progress bar; end the program with a message when it fails."""
     from leeway import bus, processes
-    from leeway.run import Interrupted, RunConfig, RunFailed
-    from leeway.run import run as run_scene
+    from leeway.run import Interrupted, RunFailed, run
     from leeway.summary import progress_bar
 
-    scene = _load(path, sets)
-    config = RunConfig(scene, path, log, sets, lockstep, common.url, common.name)
+    log, duration = config.log, config.scene.to_dict()["duration_s"]
     try:
-        with progress_bar(path.stem, scene.to_dict()["duration_s"], common.silent) as advance:
-            return run_scene(config, advance)
+        with progress_bar(config.path.stem, duration, common.silent) as advance:
+            return run(config, advance)
     except Interrupted as error:
-        fail(f"{error}: the arm was brought to rest; log: {log}", EXIT_INTERRUPTED)
+        fail(f"{error}: {_ending(log, common)}; log: {log}", EXIT_INTERRUPTED)
+    except OSError as error:
+        fail(f"{log}: cannot write the log: {error.strerror}")
     except RunFailed as error:
         fail(f"{error}\n  everything else was stopped; log: {log}")
     except (bus.BusError, processes.ProgramMissing) as error:
@@ -194,6 +172,17 @@ def _exit_with_losses(analyses: list[Any]) -> None:
         print(f"leeway: {problem}", file=sys.stderr)
     if problems:
         raise typer.Exit(EXIT_LOSS)
+
+
+@command(app, "keys", "leeway keys")
+def keys(*, common: Common) -> None:
+    """List every key that a scene may have, with unit, range, default and meaning."""
+    from leeway._native import describe_scene
+
+    text = describe_scene()
+    print(
+        json.dumps({"keys": text}) if common.as_json else text, end="\n" if common.as_json else ""
+    )
 
 
 # --- logs ---
@@ -359,7 +348,7 @@ def obstacle_move(
 
 @command(obstacle_app, "remove", "leeway obstacle remove 7")
 def obstacle_remove(
-    number: Annotated[int, typer.Argument(metavar="ID", min=1)],
+    number: Annotated[int, typer.Argument(metavar="ID", min=1, max=(1 << 31) - 1)],
     *,
     common: Common,
 ) -> None:

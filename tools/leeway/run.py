@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import time
 from collections.abc import Callable
@@ -18,10 +20,13 @@ from leeway.processes import Child
 from leeway.scene import Scene
 
 POLL_S = 0.05
+LISTEN_S = 0.3
 LOGGER_PATIENCE_S = 5.0
+MARK_REACH = 1 << 16  # bytes from the end of the log in which a mark is looked for
 START_PATIENCE_S = 15.0
 REST_PATIENCE_S = 2.0
 NEVER_MOVED = -1.0
+PACE = 3000
 
 
 class RunFailed(Exception):
@@ -43,14 +48,16 @@ class RunConfig:
     lockstep: bool = False
     url: str | None = None
     name: str | None = None
+    pace: int = PACE  # messages a second in lockstep
 
 
 class _Interrupt:
-    """Turns SIGINT and SIGTERM into a flag for the life of a run."""
+    """Turns SIGINT, SIGTERM and SIGHUP into a flag for the life of a run."""
 
     def __enter__(self) -> _Interrupt:
         self.requested = False
-        self._old = {s: signal.signal(s, self._note) for s in (signal.SIGINT, signal.SIGTERM)}
+        stops = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        self._old = {s: signal.signal(s, self._note) for s in stops}
         return self
 
     def _note(self, _: int, __: FrameType | None) -> None:
@@ -68,6 +75,7 @@ class _Watch:
         self.bus = bus
         self.motion_s = NEVER_MOVED
         self.at_rest = True
+        self._sessions: set[int] = set()
         subscription = bus.subscribe(bus_tools.channel("JOINT_STATE", name), self._on_state)
         subscription.set_queue_capacity(1)
 
@@ -78,6 +86,12 @@ class _Watch:
             return
         self.motion_s = state.tick * state.period_ns * 1e-9
         self.at_rest = all(v == 0 for v in state.qd)
+        self._sessions.add(state.h.session)
+
+    @property
+    def plants(self) -> int:
+        """Number of plants heard."""
+        return len(self._sessions)
 
     def wait(self) -> None:
         """Handle what comes in the next moment."""
@@ -103,24 +117,42 @@ def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> f
     RunFailed
         A process ended early or never moved; everything else was stopped, the log is whole.
     Interrupted
-        Ctrl-C; the arm was brought to rest, everything was stopped, the log is whole.
+        Ctrl-C; the controller was asked to brake, everything was stopped, the log is whole.
+    OSError
+        The log cannot be written; nothing was started.
     """
     url = bus_tools.resolve_url(config.url)
     bus = bus_tools.open_bus(url)
     children: list[Child] = []
     with _Interrupt() as interrupt:
         try:
+            _refuse_company(bus_tools.open_bus(url), config.name)
             _start(config, url, bus, children)
             return _watch(config, bus, children, interrupt, progress)
         finally:
-            # The controller first, which brakes the arm; then the plant; the recorder last.
-            for child in reversed(children):
-                child.stop()
+            _stop(config, bus, children)
+
+
+def _refuse_company(bus: lcm.LCM, name: str | None) -> None:
+    """Listen for a moment; two plants or controllers on one bus would mix their messages."""
+    heard: list[str] = []
+    for channel in ("JOINT_STATE", "JOINT_COMMAND"):
+        bus.subscribe(bus_tools.channel(channel, name), lambda found, _: heard.append(found))
+    end = time.monotonic() + LISTEN_S
+    while not heard and (left := end - time.monotonic()) > 0:
+        bus_tools.handle(bus, left)
+    if heard:
+        raise RunFailed(
+            f"another run is on this bus ({heard[0]} heard): stop it, or use another "
+            "--lcm-url port or --name"
+        )
 
 
 def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> None:
     """Start logger, simulator, controller; the logger records before the others begin."""
     config.log.parent.mkdir(parents=True, exist_ok=True)
+    if config.log.exists() and not config.log.is_file():
+        raise OSError(errno.EINVAL, "not a regular file", str(config.log))
     config.log.unlink(missing_ok=True)  # an old log would pass for the new one's first event
     # A recorder that waits for the processor loses what its short queue cannot hold.
     logger = Child("lcm-logger", "-q", "-f", f"--lcm-url={url}", str(config.log), ahead=True)
@@ -130,8 +162,36 @@ def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> 
     args += [f"--set={one}" for one in config.sets]
     args += ["--lockstep"] if config.lockstep else []
     args += [f"--name={config.name}"] if config.name else []
-    children.append(Child("leeway-simulator", "--until-done", *args))
+    pace = f"--pace={config.pace}"
+    children.append(Child("leeway-simulator", "--until-done", pace, *args))
     children.append(Child("leeway-controller", *args))
+
+
+def _stop(config: RunConfig, bus: lcm.LCM, children: list[Child]) -> None:
+    """Stop the controller, which brakes the arm; then the plant; the recorder last."""
+    for child in reversed(children[1:]):
+        child.stop()
+    if children:
+        _wait_for_mark(children[0], bus, config.log)
+        children[0].stop()
+
+
+def _wait_for_mark(logger: Child, bus: lcm.LCM, log: Path) -> None:
+    """Wait until the log holds a mark published last: lcm-logger drops its backlog at its end."""
+    mark = f"leeway run ends {bus_tools.new_session()}\n\0".encode()
+    end = time.monotonic() + LOGGER_PATIENCE_S
+    while logger.status() is None and time.monotonic() < end:
+        bus.publish("LCM_SELF_TEST", mark)
+        time.sleep(POLL_S)
+        if log.exists() and mark in _tail(log):
+            return
+
+
+def _tail(log: Path) -> bytes:
+    """Return the last bytes of a log."""
+    with log.open("rb") as file:
+        file.seek(-min(MARK_REACH, log.stat().st_size), os.SEEK_END)
+        return file.read()
 
 
 def _wait_for_logger(logger: Child, bus: lcm.LCM, log: Path) -> None:
@@ -155,6 +215,8 @@ def _watch(
     watch = _Watch(bus, config.name)
     simulator = children[1]
     started = time.monotonic()
+    # The controller listens to the plant for 16 periods before it starts.
+    patience = START_PATIENCE_S + 20 / float(config.scene.to_dict()["rate_hz"])
     moved: float | None = None
     while simulator.status() is None:
         watch.wait()
@@ -165,8 +227,10 @@ def _watch(
         if interrupt.requested:
             raise Interrupted(f"interrupted at t = {max(watch.motion_s, 0):.3f} s")
         _check_others(children, watch)
-        if moved is None and time.monotonic() - started > START_PATIENCE_S:
-            raise RunFailed(f"the arm did not move within {START_PATIENCE_S:g} s{_words(children)}")
+        if watch.plants > 1:
+            raise RunFailed("a second plant came to this bus: its messages mix with this run's")
+        if moved is None and time.monotonic() - started > patience:
+            raise RunFailed(f"the arm did not move within {patience:g} s{_words(children)}")
     if simulator.status() != 0:
         raise RunFailed(
             f"{simulator.ending()} at t = {max(watch.motion_s, 0):.3f} s{_words([simulator])}"

@@ -109,14 +109,21 @@ class Run:
     flags: npt.NDArray[np.int32]
 
 
-def simulate(scene: Scene) -> Run:
+def simulate(scene: Scene | str | Path) -> Run:
     """Run a scene in this process: the controller's tick and the plant's step in turn.
 
     The numbers are those of a lockstep run over the bus, bit for bit. The GIL is released.
+
+    Parameters
+    ----------
+    scene
+        A scene, or what `load_scene` takes.
 
     Raises
     ------
     ValueError
         The scene has a law or robot that the C code does not know.
     """
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
     return Run(scene=scene, **_native.simulate(scene._native))

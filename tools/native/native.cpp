@@ -176,5 +176,6 @@ NB_MODULE(_native, m)
         .def("to_yaml", &Scene::to_yaml, "The whole scene as YAML, exact to the last bit.");
     m.def("read_scene", &Scene::read, nb::arg("text"), nb::arg("name"), nb::arg("sets"),
           "Reads a scene from YAML text; sets is a list of \"key=value\".");
+    m.def("describe_scene", &describe_scene, "Reference of all keys of a scene, for people.");
     m.def("simulate", &simulate, nb::arg("scene"), "Runs a scene in process; arrays by name.");
 }

@@ -67,6 +67,21 @@ nb::dict section(const lw_key *keys, const unsigned char *at)
     return out;
 }
 
+// What a function prints.
+template <typename Print> std::string printed(Print print)
+{
+    char *text = nullptr;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (to == nullptr)
+        throw std::bad_alloc();
+    print(to);
+    std::fclose(to);
+    std::string out(text, size);
+    std::free(text);
+    return out;
+}
+
 } // namespace
 
 Scene Scene::read(const std::string &text, const std::string &name, const std::vector<std::string> &sets)
@@ -89,14 +104,10 @@ nb::dict Scene::to_dict() const
 
 std::string Scene::to_yaml() const
 {
-    char *text = nullptr;
-    size_t size = 0;
-    FILE *to = open_memstream(&text, &size);
-    if (to == nullptr)
-        throw std::bad_alloc();
-    lw_scene_write(&data, to);
-    std::fclose(to);
-    std::string out(text, size);
-    std::free(text);
-    return out;
+    return printed([this](FILE *to) { lw_scene_write(&data, to); });
+}
+
+std::string describe_scene()
+{
+    return printed(lw_scene_describe);
 }

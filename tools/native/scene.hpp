@@ -26,4 +26,7 @@ struct Scene {
     std::string to_yaml() const;
 };
 
+// Reference of all keys, for people.
+std::string describe_scene();
+
 #endif

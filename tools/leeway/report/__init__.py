@@ -9,6 +9,7 @@ import base64
 import io
 import json
 import re
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,18 +81,25 @@ def write_report(
         raise ValueError("expected at least one run, found none")
     out_dir = Path(out_dir)
     out_dir.mkdir(parents=True, exist_ok=True)
-    say = progress or (lambda _: None)
+    # Everything or nothing: an interrupted report leaves the folder as it was.
+    with tempfile.TemporaryDirectory(prefix=".", dir=out_dir) as scratch:
+        _write(analyses, Path(scratch), progress or (lambda _: None))
+        for path in sorted(Path(scratch).iterdir()):
+            path.replace(out_dir / path.name)
+    return out_dir / PAGE
+
+
+def _write(analyses: Sequence[Analysis], folder: Path, say: Callable[[str], None]) -> None:
+    """Write all files of a report into a folder."""
     runs = list(zip(_labels(analyses), analyses, strict=True))
     slugs = _slugs([label for label, _ in runs])
     sections = [
-        _section(label, slug, a, _Writer(out_dir, slug, say))
+        _section(label, slug, a, _Writer(folder, slug, say))
         for (label, a), slug in zip(runs, slugs, strict=True)
     ]
-    comparison = _comparison(runs, _Writer(out_dir, "compare", say)) if len(runs) > 1 else {}
+    comparison = _comparison(runs, _Writer(folder, "compare", say)) if len(runs) > 1 else {}
     say("page")
-    page = out_dir / PAGE
-    page.write_text(_render(sections, comparison), encoding="utf-8")
-    return page
+    (folder / PAGE).write_text(_render(sections, comparison), encoding="utf-8")
 
 
 # --- pictures ---

@@ -1,0 +1,66 @@
+"""What all commands of `leeway` share: options, exit statuses, and how they are registered."""
+
+import functools
+import inspect
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+EXIT_FAILED, EXIT_USAGE, EXIT_LOSS, EXIT_INTERRUPTED = 1, 2, 3, 130
+
+
+def check_name(name: str | None) -> str | None:
+    """Refuse what LCM would read as a pattern."""
+    if name is not None and not re.fullmatch(r"[A-Za-z0-9_-]{1,30}", name):
+        raise typer.BadParameter(f"expected 1 to 30 letters, digits, _ or -, found {name!r}")
+    return name
+
+
+@dataclass(frozen=True)
+class Common:
+    """Options that every command has."""
+
+    url: Annotated[str | None, typer.Option("--lcm-url", metavar="URL", help="LCM bus.")] = None
+    name: Annotated[
+        str | None,
+        typer.Option("--name", "-n", help="Robot's channel prefix.", callback=check_name),
+    ] = None
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Errors only.")] = False
+
+    @property
+    def silent(self) -> bool:
+        """No progress for people: quiet, or JSON asked for."""
+        return self.quiet or self.as_json
+
+
+def command(group: typer.Typer, name: str, example: str, **settings: Any) -> Callable[..., Any]:
+    """Register a command: its own parameters, then the common ones, handed over as `common`."""
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        own = [p for p in inspect.signature(function).parameters.values() if p.name != "common"]
+        shared = list(inspect.signature(Common).parameters.values())
+
+        @functools.wraps(function)
+        def call(**values: Any) -> None:
+            common = Common(**{p.name: values.pop(p.name) for p in shared})
+            function(common=common, **values)
+
+        call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in own + shared]
+        )
+        call.__annotations__ = {p.name: p.annotation for p in own + shared}
+        group.command(name, epilog=f"Example: {example}", **settings)(call)
+        return function
+
+    return register
+
+
+def fail(message: str, status: int = EXIT_FAILED) -> NoReturn:
+    """Print one message to stderr and end."""
+    print(f"leeway: {message}", file=sys.stderr)
+    raise typer.Exit(status)
