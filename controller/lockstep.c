@@ -110,8 +110,9 @@ int lw_control_lockstep(struct lw_control *control)
     }
     lw_program_say(control->program, "ready, in lockstep");
     const bool ok = serve(&lockstep);
+    const int64_t refused = lockstep.refused + lw_bus_refused(lockstep.bus);
     lw_program_say(control->program, "%lld ticks, %lld messages refused", (long long)control->state.tick,
-                   (long long)(lockstep.refused + lw_bus_refused(lockstep.bus)));
+                   (long long)refused);
     lw_bus_close(lockstep.bus);
     return ok ? lw_stop_exit_status() : 1;
 }

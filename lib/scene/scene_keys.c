@@ -131,7 +131,8 @@ struct lw_scene lw_scene_defaults(enum lw_robot robot)
         scene.limits.position_max[j] = arm->position_max[j];
         scene.limits.velocity[j] = scene.plant.velocity[j] = arm->velocity_max[j];
     }
+    // The plant holds the guard's limit too: after a lost command it does not make up for it in one step.
     fill(scene.limits.acceleration, 8);
-    fill(scene.plant.acceleration, 15);
+    fill(scene.plant.acceleration, 8);
     return scene;
 }

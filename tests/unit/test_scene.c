@@ -86,7 +86,7 @@ static void the_robot_decides_the_defaults(void **state)
             assert_near(scene.limits.velocity[j], arm->velocity_max[j], 0);
             assert_near(scene.plant.velocity[j], arm->velocity_max[j], 0);
             assert_near(scene.limits.acceleration[j], 8, 0);
-            assert_near(scene.plant.acceleration[j], 15, 0);
+            assert_near(scene.plant.acceleration[j], 8, 0);
         }
     }
     assert_near(accept("robot=ur10").limits.velocity[0], 2 * 3.14159265358979323846 / 3, 1e-15);
@@ -164,7 +164,7 @@ static void the_plant_is_as_strong_as_the_guard_believes(void **state)
     refuse("plant.acceleration=[8, 8, 8, 7.5, 8, 8]",
            "s.yaml: plant.acceleration: joint 4: expected at least limits.acceleration = 8, found 7.5");
     refuse("limits.acceleration=off",
-           "s.yaml: plant.acceleration: joint 1: expected at least limits.acceleration = inf, found 15");
+           "s.yaml: plant.acceleration: joint 1: expected at least limits.acceleration = inf, found 8");
     refuse("plant.velocity=3", "s.yaml: plant.velocity: joint 1: expected at least limits.velocity = 3.14159, found 3");
 }
 
