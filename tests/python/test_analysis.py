@@ -57,6 +57,12 @@ def test_plain_run(tmp_path: Path) -> None:
     assert texts(a, "end") == ["0.400 end of the scene: 0.4 s of motion"]
 
 
+def test_motion_may_outlast_the_scene(tmp_path: Path) -> None:
+    run = Run(ticks=60)
+    found = texts(analysed(run, tmp_path), "end")
+    assert found == ["0.472 end of the motion, which went on after the scene's 0.4 s"]
+
+
 def test_motion_begins_with_the_first_command_obeyed_and_ends_with_the_last_new_state(
     tmp_path: Path,
 ) -> None:

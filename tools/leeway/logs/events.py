@@ -202,7 +202,11 @@ def _restarts(log: Log, motion: Motion) -> Iterator[Event]:
 
 def _ending(motion: Motion, duration: float) -> Iterator[Event]:
     end = float(motion.t[-1])
-    if end >= duration - motion.period / 2:
+    if end > duration + motion.period / 2:
+        yield Event(
+            end, "end", f"end of the motion, which went on after the scene's {duration:g} s"
+        )
+    elif end >= duration - motion.period / 2:
         yield Event(end, "end", f"end of the scene: {duration:g} s of motion")
     elif motion.commands_after:
         text = f"joint states end {duration - end:.3f} s before the scene does: is the plant gone?"
