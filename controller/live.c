@@ -39,7 +39,7 @@ struct live {
     struct lw_world world;             // main's working copy
     struct lw_request_memory requests; // main: those put into the mailbox
     struct lw_stamp last_state;        // rx: newest joint state taken
-    int64_t world_refused;             // main: changes that did not fit
+    int64_t world_refused;             // main: changes that did not fit or were overtaken
     atomic_bool stopping;              // main -> rt: brake, then end
     atomic_bool abandoned;             // main -> rt: end now, a second signal came
     atomic_bool rt_done;               // rt -> main: at rest, or never moved

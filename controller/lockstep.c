@@ -20,9 +20,10 @@ struct lockstep {
     struct lw_bus *bus;
     struct lw_world world;
     struct lw_request request;
-    union lw_message command; // last one sent
-    int64_t refused;          // obstacle messages
-    int64_t plant_session;    // of the state it answers
+    struct lw_request_memory requests; // those put into `request`
+    union lw_message command;          // last one sent
+    int64_t refused;                   // obstacle messages
+    int64_t plant_session;             // of the state it answers
     int64_t plant_tick;
 };
 
@@ -55,7 +56,7 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
         on_joint_state(l, &message->joint_state);
     else if (channel == LW_CHANNEL_OBSTACLES)
         l->refused += lw_world_apply(&l->world, &message->obstacles) != LW_OK;
-    else if (channel == LW_CHANNEL_GOAL || channel == LW_CHANNEL_STOP)
+    else if (lw_request_is_new(&l->requests, &message->request)) // a repetition must not replace one not ticked yet
         l->request = message->request;
 }
 

@@ -29,7 +29,7 @@ enum { PACE = 3000 };
 // The first two are the simulator's alone: the controller's table starts behind them.
 enum { SIMULATOR_OPTIONS = 2 };
 static const struct argp_option argp_options[] = {
-    {"until-done", KEY_UNTIL_DONE, NULL, 0, "End after the scene's duration_s instead of running until stopped.", 0},
+    {"until-done", KEY_UNTIL_DONE, NULL, 0, "End after the scene's duration_s, as lockstep does, not when stopped.", 0},
     {"pace", KEY_PACE, "N", 0, "In lockstep, N messages a second at most, so that a recorder can follow (3000).", 0},
     {"set", 's', "KEY=VALUE", 0, "Replace a key of the scene, as in --set law.gamma=2. Repeatable.", 0},
     {"lcm-url", KEY_URL, "URL", 0, "LCM bus. Default: $LCM_DEFAULT_URL, else multicast that stays on this host.", 0},

@@ -15,6 +15,12 @@ def test_loads_from_path_and_from_text(root):
     assert leeway.load_scene(str(path)).to_dict()["law"]["rho_rep"] == 1.9
 
 
+def test_a_required_key_may_come_from_the_command_line():
+    text = "robot: ur5\nq0: [0, 0, 0, 0, 0, 0]\n"
+    scene = leeway.load_scene(text, ["request.goal=[0.1, 0.2, 0.3]"])
+    assert scene.to_dict()["request"]["goal"] == [0.1, 0.2, 0.3]
+
+
 def test_changed_copy_leaves_the_original(root):
     scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
     changed = scene.with_({"law.rho_rep": 0.1 + 0.2, "q0": [0, -1.5, 0, 0, 0, 0]})

@@ -45,14 +45,11 @@ AtOption = Annotated[
 ]
 
 
-def _load(path: Path, sets: list[str] | None) -> Any:
-    from leeway.scene import Scene, load_scene
+def _load(path: Path, sets: list[str]) -> Any:
+    from leeway.scene import load_scene
 
     try:
-        scene = load_scene(path)
-        return (
-            Scene(path.read_text(encoding="utf-8"), str(path), tuple(sets or ())) if sets else scene
-        )
+        return load_scene(path, sets)
     except OSError as error:
         fail(f"{path}: cannot read the scene: {error.strerror}", EXIT_USAGE)
     except ValueError as error:
@@ -180,9 +177,7 @@ def keys(*, common: Common) -> None:
     from leeway._native import describe_scene
 
     text = describe_scene()
-    print(
-        json.dumps({"keys": text}) if common.as_json else text, end="\n" if common.as_json else ""
-    )
+    print(json.dumps({"keys": text}) if common.as_json else text.rstrip())
 
 
 # --- logs ---

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,13 +60,15 @@ def _yaml(value: Any) -> str:
     return str(value)
 
 
-def load_scene(path_or_text: str | Path) -> Scene:
+def load_scene(path_or_text: str | Path, sets: Sequence[str] = ()) -> Scene:
     """Read a scene.
 
     Parameters
     ----------
     path_or_text
         Path of a YAML file, or YAML text (recognised by its line breaks).
+    sets
+        Values that replace or add to it, ``"key=value"`` as on the command line.
 
     Raises
     ------
@@ -76,10 +78,10 @@ def load_scene(path_or_text: str | Path) -> Scene:
         The file cannot be read.
     """
     if isinstance(path_or_text, str) and "\n" in path_or_text:
-        return Scene(path_or_text, "scene")
+        return Scene(path_or_text, "scene", tuple(sets))
     path = Path(path_or_text)
     try:
-        return Scene(path.read_text(encoding="utf-8"), str(path))
+        return Scene(path.read_text(encoding="utf-8"), str(path), tuple(sets))
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: not a text file: {error.reason}") from error
 
