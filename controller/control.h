@@ -13,7 +13,7 @@
 #include "program/program.h" // struct lw_program
 
 struct lw_control {
-    const struct lw_program *program;
+    struct lw_program *program;
     struct lw_controller config;
     struct lw_controller_state state;
 };

@@ -22,7 +22,6 @@ struct lockstep {
     struct lw_request request;
     struct lw_request_memory requests; // those put into `request`
     union lw_message command;          // last one sent
-    int64_t refused;                   // obstacle messages
     int64_t plant_session;             // of the state it answers
     int64_t plant_tick;
 };
@@ -55,7 +54,8 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
     if (channel == LW_CHANNEL_JOINT_STATE)
         on_joint_state(l, &message->joint_state);
     else if (channel == LW_CHANNEL_OBSTACLES)
-        l->refused += lw_world_apply(&l->world, &message->obstacles) != LW_OK;
+        (void)lw_refusals_note(&l->control->program->refusals,
+                               lw_verdict_of(lw_world_apply(&l->world, &message->obstacles)));
     else if (lw_request_is_new(&l->requests, &message->request)) // a repetition must not replace one not ticked yet
         l->request = message->request;
 }
@@ -111,9 +111,8 @@ int lw_control_lockstep(struct lw_control *control)
     }
     lw_program_say(control->program, "ready, in lockstep");
     const bool ok = serve(&lockstep);
-    const int64_t refused = lockstep.refused + lw_bus_refused(lockstep.bus);
     lw_program_say(control->program, "%lld ticks, %lld messages refused", (long long)control->state.tick,
-                   (long long)refused);
+                   (long long)lw_refusals_total(&control->program->refusals));
     lw_bus_close(lockstep.bus);
     return ok ? lw_stop_exit_status() : 1;
 }

@@ -24,7 +24,7 @@ int main(int argc, char **argv)
     };
     static struct lw_control control = {.program = &program};
     lw_program_start(&program, argc, argv);
-    if (lw_controller_init(&control.config, &control.state, &program.scene) != LW_OK) {
+    if (lw_controller_init(&control.config, &control.state, &program.scene, program.bus_config.session) != LW_OK) {
         lw_program_fail(&program, "%s: scene not usable", program.path);
         return 2;
     }

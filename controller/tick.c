@@ -9,6 +9,7 @@
 #include "controller/tick.h"
 
 #include "base/clock.h"       // LW_NS_PER_S
+#include "base/digest.h"      // lw_digest_*
 #include "base/vec.h"         // lw_vec_*, lw_all_finite
 #include "controller/guard.h" // lw_guard_shape
 
@@ -19,13 +20,14 @@ static const int64_t stale_after_ns = 20 * 1000 * 1000;
 enum { STALE_PERIODS = 3 };
 
 enum lw_status lw_controller_init(struct lw_controller *config, struct lw_controller_state *state,
-                                  const struct lw_scene *scene)
+                                  const struct lw_scene *scene, int64_t session)
 {
     if (scene->robot < 0 || scene->robot >= LW_ROBOT_COUNT || scene->law.name != LW_LAW_APF)
         return LW_E_ARGUMENT;
     const int64_t period_ns = lw_scene_period_ns(scene->rate_hz);
     const int64_t patience_ns = STALE_PERIODS * period_ns;
-    *config = (struct lw_controller){.arm = lw_arm_get((enum lw_robot)scene->robot),
+    *config = (struct lw_controller){.session = session,
+                                     .arm = lw_arm_get((enum lw_robot)scene->robot),
                                      .law = lw_law_get((enum lw_law_name)scene->law.name),
                                      .params = scene->law,
                                      .limits = scene->limits,
@@ -39,14 +41,23 @@ enum lw_status lw_controller_init(struct lw_controller *config, struct lw_contro
 
 // --- estimate ---
 
-// Adopts the plant's own velocity where the plant does not follow our commands: a new plant, or one that ramps to rest.
-// Once a state: a plant that died while it ramped must not keep us from coming to rest.
-static void estimate(struct lw_controller_state *state, const struct lw_tick_input *in)
+// Whether the plant moves by another controller's commands.
+static bool is_foreign(const struct lw_controller *config, const struct lw_joint_state *joint)
+{
+    return joint->mode == LW_PLANT_MOVING && joint->command_session != config->session;
+}
+
+// Adopts the plant's own velocity where the plant does not follow our commands: a new plant, one that ramps to rest, or
+// one that obeys another controller. Once a state: a plant that died while it ramped must not keep us from coming to
+// rest.
+static void estimate(const struct lw_controller *config, struct lw_controller_state *state,
+                     const struct lw_tick_input *in)
 {
     const struct lw_joint_state *joint = in->joint;
     const bool new_plant = joint->stamp.session != state->plant_session;
     const bool new_state = joint->stamp.seq != state->state_seq;
-    if (new_plant || (new_state && joint->mode != LW_PLANT_MOVING))
+    const bool follows = joint->mode == LW_PLANT_MOVING && !is_foreign(config, joint);
+    if (new_plant || (new_state && !follows))
         for (int j = 0; j < LW_NJ; j++)
             state->velocity[j] = isfinite(joint->qd[j]) ? joint->qd[j] : 0.0;
     state->plant_session = joint->stamp.session;
@@ -73,32 +84,57 @@ static unsigned brake_reasons(const struct lw_controller *config, const struct l
                               const struct lw_tick_input *in)
 {
     unsigned flags = 0;
-    if (in->world->version == 0)
+    if (in->warming_up)
+        flags |= LW_WARMING_UP;
+    if (in->world->version == 0 || in->joint->stamp.session == 0)
         flags |= LW_WAITING;
     if (state->request.kind == LW_REQUEST_STOP)
         flags |= LW_STOPPED;
     if (in->state_age_ns > config->stale_after_ns)
         flags |= LW_STALE;
+    if (is_foreign(config, in->joint))
+        flags |= LW_FOREIGN;
     return flags;
 }
 
 // Asks the law at the measured configuration. A configuration that is no number gives no wish either.
-static void ask_law(const struct lw_controller *config, const struct lw_controller_state *state,
-                    const struct lw_tick_input *in, struct lw_pose frame[LW_NJ], struct lw_law_output *law)
+static enum lw_law_outcome ask_law(const struct lw_controller *config, const struct lw_controller_state *state,
+                                   const struct lw_tick_input *in, struct lw_pose frame[LW_NJ],
+                                   struct lw_law_output *law)
 {
     if (lw_arm_fk(config->arm, in->joint->q, frame) == LW_OK) {
         const struct lw_law_input law_in = {.frame = frame, .world = in->world, .goal = state->request.goal};
         config->law->step(&config->params, &law_in, law);
-        return;
+        return lw_all_finite(law->qd, LW_NJ) ? LW_LAW_OK : LW_LAW_NO_NUMBER;
     }
     // Nothing is known then, neither the wish nor where the frames are.
     const double nan = (double)NAN;
     *law = (struct lw_law_output){.qd = {nan, nan, nan, nan, nan, nan}, .nearest = {.distance = -1}};
     for (int i = 0; i < LW_NJ; i++)
         frame[i] = (struct lw_pose){.p = {nan, nan, nan}};
+    return LW_LAW_NOT_ASKED;
 }
 
 // --- explain ---
+
+// Digest of all that the tick was given, so that a replay can tell that it was given the same.
+static int64_t digest_input(const struct lw_controller_state *state, const struct lw_tick_input *in)
+{
+    const struct lw_joint_state *joint = in->joint;
+    const struct lw_request *request = &state->request;
+    const int64_t words[] = {
+        joint->stamp.utime,   joint->stamp.mono_ns,    joint->stamp.session,   joint->stamp.seq,
+        (int64_t)joint->mode, joint->command_session,  joint->command_seq,     joint->tick,
+        joint->period_ns,     in->world->last.session, in->world->last.seq,    in->world->version,
+        in->world->digest,    request->stamp.session,  request->stamp.seq,     (int64_t)request->kind,
+        in->time_ns,          in->state_age_ns,        (int64_t)in->warming_up};
+    uint64_t digest = LW_DIGEST_START;
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        digest = lw_digest_int(digest, words[i]);
+    digest = lw_digest_doubles(digest, joint->q, LW_NJ);
+    digest = lw_digest_doubles(digest, joint->qd, LW_NJ);
+    return (int64_t)lw_digest_doubles(digest, request->goal, 3);
+}
 
 static void explain(const struct lw_controller_state *state, const struct lw_tick_input *in, const double tip[3],
                     const struct lw_law_output *law, struct lw_joint_command *out)
@@ -121,6 +157,7 @@ static void explain(const struct lw_controller_state *state, const struct lw_tic
     out->tick = state->tick;
     out->tick_ns = in->time_ns;
     out->state_age_ns = in->state_age_ns;
+    out->input_digest = digest_input(state, in);
 }
 
 void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
@@ -132,16 +169,16 @@ void lw_tick(const struct lw_controller *config, struct lw_controller_state *sta
     *out = (struct lw_joint_command){0};
     state->tick++;
 
-    estimate(state, in);
+    estimate(config, state, in);
     select_request(state, in->request);
-    ask_law(config, state, in, frame, &law);
+    out->law_outcome = ask_law(config, state, in, frame, &law);
 
     // The guard has the last word; a reason to brake replaces the law's wish by rest.
     out->flags = brake_reasons(config, state, in);
     const double *wish = out->flags ? rest : law.qd;
     const double period_s = (double)config->period_ns / (double)LW_NS_PER_S;
     out->flags |= lw_guard_shape(&config->limits, period_s, in->joint->q, state->velocity, wish, out->qd);
-    out->mode = (out->flags & LW_WAITING) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
+    out->mode = (out->flags & (LW_WAITING | LW_WARMING_UP)) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
     memcpy(state->velocity, out->qd, sizeof state->velocity);
 
     explain(state, in, frame[LW_NJ - 1].p, &law, out);

@@ -19,6 +19,7 @@
 
 // Constant for the life of a run.
 struct lw_controller {
+    int64_t session; // this controller's, on the wire; 0 = none but this one
     const struct lw_arm *arm;
     const struct lw_law *law;
     struct lw_law_params params;
@@ -41,17 +42,20 @@ struct lw_controller_state {
 struct lw_tick_input {
     int64_t time_ns;                    // the tick's own time
     int64_t state_age_ns;               // age of *joint at time_ns
-    const struct lw_joint_state *joint; // newest joint state
+    bool warming_up;                    // all is computed, nothing may move
+    const struct lw_joint_state *joint; // newest joint state; session 0 = none yet
     const struct lw_world *world;       // newest snapshot; version 0 = nothing heard yet
     const struct lw_request *request;   // newest request; session 0 = none yet
 };
 
-// Everything a run of `scene` needs. Fails LW_E_ARGUMENT when the scene names no known robot or law.
+// Everything a run of `scene` needs, for the controller of a session. Fails LW_E_ARGUMENT when the scene names no
+// known robot or law.
 LW_MUST_CHECK enum lw_status lw_controller_init(struct lw_controller *config, struct lw_controller_state *state,
-                                                const struct lw_scene *scene);
+                                                const struct lw_scene *scene, int64_t session);
 
 // One tick: estimate, select request, law, guard, explain.
-//   out  command and explanation; stamp, wake_late_ns, previous_exec_ns and skipped are left 0 for the process to fill
+//   out  command and explanation; stamp, compute_ns, wake_late_ns, previous_exec_ns and skipped are left 0 for the
+//        process to fill
 // Cost: fixed plus linear in the number of obstacles.
 void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
              struct lw_joint_command *out);

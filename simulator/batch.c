@@ -35,7 +35,7 @@ enum lw_status lw_batch_run(const struct lw_scene *scene, const struct lw_batch_
 {
     struct lw_controller config;
     struct lw_controller_state state;
-    enum lw_status status = lw_controller_init(&config, &state, scene);
+    enum lw_status status = lw_controller_init(&config, &state, scene, CONTROLLER_SESSION);
     if (status != LW_OK)
         return status;
     struct lw_plant plant;
@@ -63,7 +63,7 @@ enum lw_status lw_batch_run(const struct lw_scene *scene, const struct lw_batch_
         store(result, k, &config, &command);
 
         command.stamp = (struct lw_stamp){.session = CONTROLLER_SESSION, .seq = k + 1};
-        (void)lw_plant_accept(&plant, &arm, &command, now_ns);
+        lw_plant_obey(&arm, &command, now_ns);
         for (int i = 0; i < ratio; i++)
             lw_plant_step(&plant, &arm, arm.tick * plant.period_ns);
     }

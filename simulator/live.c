@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Live: the plant at its own fixed rate. Three threads, handing newest values over by a mailbox:
-//   rt    (FIFO 80) sleeps to its deadline, steps the plant, publishes the state on a connection of its own
-//   LCM's (FIFO 79) receive threads of the commands, drained by `rx`
-//   main  (normal)  obstacles at 10 Hz as a sensor would, scene announcements, words for people, signals
+// Live: the plant at its own fixed rate. Threads hand over by a mailbox and a ring; nothing else is shared:
+//   rt     (FIFO P)    sleeps to its deadline, steps the plant, publishes the state on a connection of its own
+//   rx     (FIFO P-1)  commands, judged by the gate
+//   sensor (normal)    obstacles at 10 Hz as a perception source would
+//   main   (normal)    statistics, PLANT_STATUS and SCENE, words for people, signals
 //
 // Units    ns of CLOCK_MONOTONIC.
 // Frames   see plant.h.
@@ -15,26 +16,33 @@
 #include "base/mailbox.h"  // lw_mailbox_*
 #include "base/periodic.h" // lw_periodic_*
 #include "base/stop.h"     // lw_stop_signal
-#include "base/thread.h"   // lw_thread_*
 
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
-enum { RT_PRIORITY = 80, RX_PRIORITY = 79, POLL_MS = 50, OBSTACLE_POLLS = 2 };
+enum { POLL_MS = 50, OBSTACLE_POLLS = 2 };
+static const int64_t report_period_ns = LW_NS_PER_S / 20;
+static const int64_t warm_up_ns = LW_NS_PER_S / 2;
+
+// A command that was taken, when, and what had become of the stream then.
+struct arrival {
+    struct lw_joint_command command;
+    int64_t arrival_ns;
+    struct lw_lease lease;
+};
 
 struct live {
     struct lw_simulation *simulation;
-    struct lw_bus *rt_bus, *rx_bus, *sensor_bus;
-    struct lw_mailbox command_box;
-    _Alignas(LW_CACHE_LINE) struct lw_joint_command command_slots[LW_MAILBOX_SLOTS];
-    atomic_bool stopping;             // main -> rt: ramp to rest, then end
-    atomic_bool rt_done;              // rt -> main, rx
-    atomic_int mode;                  // rt -> main: enum lw_plant_mode
-    atomic_int_fast64_t tick;         // rt -> main
-    atomic_int_fast64_t timeouts;     // rt -> main: times that commands ceased
-    atomic_int_fast64_t timeout_tick; // rt -> main: when they did last
-    atomic_int_fast64_t skipped;      // rt -> main
-    atomic_int_fast64_t unsent;       // rt -> main: states the system refused to send
+    struct lw_bus *rt_bus, *rx_bus, *main_bus;
+    struct lw_mailbox command_box; // rx -> rt: struct arrival
+    _Alignas(LW_CACHE_LINE) struct arrival command_slots[LW_MAILBOX_SLOTS];
+    struct lw_health health;       // rt -> main
+    struct lw_gate gate;           // rx
+    struct lw_lease lease;         // rx
+    atomic_int_fast64_t state_seq; // rt -> rx: newest state published
+    atomic_bool stopping;          // main -> rt: ramp to rest, then end
+    atomic_bool rt_done;           // rt -> all
+    atomic_bool bus_failed;        // rx -> main
 };
 
 // --- receiving ---
@@ -43,79 +51,119 @@ static void on_command(void *user, enum lw_channel channel, const union lw_messa
 {
     (void)channel;
     struct live *live = user;
-    struct lw_joint_command *slot = lw_mailbox_slot(&live->command_box);
-    *slot = message->joint_command;
+    const int64_t now_ns = lw_clock_mono_ns(), state_seq = atomic_load(&live->state_seq);
+    const enum lw_verdict verdict =
+        lw_gate_judge(&live->gate, &live->lease, &message->joint_command, state_seq, now_ns);
+    if (!lw_refusals_note(&live->simulation->program->refusals, verdict))
+        return;
+    struct arrival *slot = lw_mailbox_slot(&live->command_box);
+    *slot = (struct arrival){.command = message->joint_command, .arrival_ns = now_ns, .lease = live->lease};
     lw_mailbox_publish(&live->command_box);
 }
 
-static void *rx_main(void *user)
+static void *receive(void *user)
 {
     struct live *live = user;
-    (void)lw_thread_set_priority(RX_PRIORITY); // main has already said when the system refuses
-    while (!atomic_load(&live->rt_done))
+    lw_program_realtime_thread(live->simulation->program, 1);
+    while (!atomic_load(&live->rt_done) && !atomic_load(&live->bus_failed))
         if (!lw_bus_handle(live->rx_bus, POLL_MS))
-            break;
+            atomic_store(&live->bus_failed, true);
     return NULL;
 }
 
 // --- the real-time thread ---
 
+struct loop {
+    struct live *live;
+    struct lw_periodic periodic;
+    int64_t start_ns;
+    struct lw_record record;
+};
+
 // Takes the newest command, or ramps to rest when the program is to stop.
-static void obey(struct live *live, int64_t now_ns)
+static void obey(struct loop *loop)
 {
-    struct lw_simulation *s = live->simulation;
-    bool fresh = false;
-    const struct lw_joint_command *command = lw_mailbox_take(&live->command_box, &fresh);
+    struct live *live = loop->live;
+    struct lw_record *record = &loop->record;
+    struct lw_plant_state *arm = &live->simulation->arm;
+    const struct arrival *arrival = lw_mailbox_take(&live->command_box, &record->fresh);
+    record->age_ns = record->time_ns - arrival->arrival_ns;
+    record->lease = arrival->lease;
+    record->command = arrival->command;
     if (atomic_load(&live->stopping))
-        lw_plant_stop(&s->arm);
-    else if (fresh)
-        (void)lw_plant_accept(&s->plant, &s->arm, command, now_ns);
+        lw_plant_stop(arm);
+    else if (record->fresh)
+        lw_plant_obey(arm, &arrival->command, arrival->arrival_ns);
 }
 
-// Tells main what changed, without ever waiting for it.
-static void tell(struct live *live, enum lw_plant_mode before, int64_t skipped)
+// Publishes the state and hands over the account of this period.
+static void publish(struct loop *loop)
 {
-    const struct lw_plant_state *arm = &live->simulation->arm;
-    if (before == LW_PLANT_MOVING && arm->mode == LW_PLANT_STOPPING) {
-        atomic_store(&live->timeout_tick, arm->tick);
-        atomic_fetch_add(&live->timeouts, 1);
-    }
-    atomic_store(&live->mode, (int)arm->mode);
-    atomic_store(&live->tick, arm->tick);
-    atomic_store(&live->skipped, skipped);
+    struct live *live = loop->live;
+    struct lw_record *record = &loop->record;
+    record->sent = lw_simulation_publish_state(live->simulation, live->rt_bus, &record->state) == LW_OK;
+    atomic_store(&live->state_seq, record->state.stamp.seq);
+    record->skipped = loop->periodic.skipped;
+    record->faults = record->state.mode == LW_PLANT_STOPPING ? LW_FAULT_PEER_TIMEOUT : 0;
+    record->exec_ns = lw_clock_mono_ns() - record->time_ns;
+    lw_health_note(&live->health, record);
 }
 
-static void step(struct live *live, const struct lw_periodic *loop)
+static void step(struct loop *loop)
 {
-    struct lw_simulation *s = live->simulation;
-    obey(live, loop->wake_ns);
-    const enum lw_plant_mode before = s->arm.mode;
-    lw_plant_step(&s->plant, &s->arm, loop->wake_ns);
-    if (lw_simulation_publish_state(s, live->rt_bus) != LW_OK)
-        atomic_fetch_add(&live->unsent, 1);
-    tell(live, before, loop->skipped);
+    struct lw_simulation *s = loop->live->simulation;
+    loop->record.time_ns = loop->periodic.wake_ns;
+    loop->record.warm = loop->record.time_ns - loop->start_ns > warm_up_ns;
+    obey(loop);
+    lw_plant_step(&s->plant, &s->arm, loop->record.time_ns);
+    publish(loop);
 }
 
-static void *rt_main(void *user)
+static void *run_plant(void *user)
 {
+    static struct loop loop;
     struct live *live = user;
     struct lw_simulation *s = live->simulation;
-    lw_thread_prefault_stack();
-    (void)lw_thread_set_priority(RT_PRIORITY);
+    lw_program_realtime_thread(s->program, 0);
+    loop.live = live;
+    loop.start_ns = lw_clock_mono_ns();
+    loop.periodic = lw_periodic_start(loop.start_ns + s->plant.period_ns, s->plant.period_ns);
 
     // When done, wait out one controller period so that the last state is answered too.
     int periods_left = lw_scene_plant_ratio(&s->program->scene) + 1;
-    struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns() + s->plant.period_ns, s->plant.period_ns);
     while (periods_left > 0) {
-        (void)lw_periodic_wait(&loop);
+        loop.record.wake_late_ns = lw_periodic_wait(&loop.periodic);
         const bool done = s->program->until_done && s->arm.tick >= s->last_tick;
         if (!done)
-            step(live, &loop);
+            step(&loop);
         periods_left -= done;
         if (atomic_load(&live->stopping) && lw_plant_at_rest(&s->arm))
             periods_left = 0;
     }
+    // Tells the controller that no more states will come.
+    s->arm.mode = LW_PLANT_ENDED;
+    publish(&loop);
+    lw_health_end(&live->health);
     atomic_store(&live->rt_done, true);
+    return NULL;
+}
+
+// --- sensor ---
+
+static void *sense(void *user)
+{
+    struct live *live = user;
+    const struct lw_program *program = live->simulation->program;
+    struct lw_bus *bus = NULL;
+    if (lw_program_open(program, &bus) != LW_OK)
+        atomic_store(&live->bus_failed, true);
+    struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), POLL_MS * INT64_C(1000000));
+    for (int poll = 0; !atomic_load(&live->rt_done) && !atomic_load(&live->bus_failed); poll++) {
+        if (poll % OBSTACLE_POLLS == 0 && lw_simulation_publish_obstacles(live->simulation, bus) != LW_OK)
+            lw_program_say(program, "OBSTACLES could not be sent");
+        (void)lw_periodic_wait(&loop);
+    }
+    lw_bus_close(bus);
     return NULL;
 }
 
@@ -125,78 +173,109 @@ static enum lw_status subscribe(struct live *live)
 {
     const struct lw_program *program = live->simulation->program;
     // LCM's read thread of the commands inherits the priority of the thread that subscribes.
-    lw_program_go_realtime(program, RX_PRIORITY);
+    lw_program_realtime_thread(program, 1);
     const enum lw_status status =
         lw_program_subscribe(program, live->rx_bus, LW_CHANNEL_JOINT_COMMAND, on_command, live);
-    (void)lw_thread_set_priority(0);
+    lw_program_normal_thread();
     return status;
 }
 
 // Says when commands cease, and when they come again.
-static void say_mode(const struct live *live, int64_t *timeouts, bool *stopped)
+static void say_mode(const struct live *live, const struct lw_joint_state *state, enum lw_plant_mode *before)
 {
     const struct lw_simulation *s = live->simulation;
-    const int64_t now = atomic_load(&live->timeouts);
-    if (now != *timeouts)
+    const double t = (double)state->tick * s->plant.period_s;
+    if (state->mode == LW_PLANT_STOPPING && *before == LW_PLANT_MOVING && !atomic_load(&live->stopping))
         lw_program_say(s->program, "no command for %g ms at t = %.3f s: ramping to rest",
-                       s->program->scene.plant.timeout_s * 1e3,
-                       (double)atomic_load(&live->timeout_tick) * s->plant.period_s);
-    else if (*stopped && atomic_load(&live->mode) == LW_PLANT_MOVING)
-        lw_program_say(s->program, "commands again at t = %.3f s",
-                       (double)atomic_load(&live->tick) * s->plant.period_s);
-    *timeouts = now;
-    *stopped = atomic_load(&live->mode) == LW_PLANT_STOPPING;
+                       s->program->scene.plant.timeout_s * 1e3, t);
+    if (state->mode == LW_PLANT_MOVING && *before == LW_PLANT_STOPPING)
+        lw_program_say(s->program, "commands again at t = %.3f s", t);
+    *before = state->mode;
 }
 
-// Sensor and words, until the real-time thread is done.
-static void serve(struct live *live)
+static enum lw_run_state run_state(const struct live *live, const struct lw_record *record)
+{
+    static const enum lw_run_state states[] = {[LW_PLANT_HOLD] = LW_RUN_WAITING,
+                                               [LW_PLANT_MOVING] = LW_RUNNING,
+                                               [LW_PLANT_STOPPING] = LW_STOPPING,
+                                               [LW_PLANT_ENDED] = LW_ENDING};
+    if (atomic_load(&live->stopping))
+        return LW_ENDING;
+    return record->warm ? states[record->state.mode] : LW_STARTING;
+}
+
+// Statistics, PLANT_STATUS and words, once.
+static void report(struct live *live, enum lw_plant_mode *before)
 {
     const struct lw_program *program = live->simulation->program;
-    struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), POLL_MS * INT64_C(1000000));
-    int64_t timeouts = 0, announce_ns = 0;
-    bool stopped = false;
-    for (int poll = 0; !atomic_load(&live->rt_done); poll++) {
-        lw_program_announce(program, live->sensor_bus, &announce_ns);
-        if (poll % OBSTACLE_POLLS == 0 && lw_simulation_publish_obstacles(live->simulation, live->sensor_bus) != LW_OK)
-            lw_program_say(program, "OBSTACLES could not be sent");
+    const struct lw_record *newest = lw_health_collect(&live->health);
+    if (newest == NULL)
+        return;
+    say_mode(live, &newest->state, before);
+    struct lw_report report = {.state = run_state(live, newest), .distance = -1};
+    if (lw_program_report(program, live->main_bus, &live->health, &report) != LW_OK)
+        lw_program_say(program, "PLANT_STATUS could not be sent");
+}
+
+// Reports, announcements and signals, until the real-time thread is done.
+static bool serve(struct live *live)
+{
+    enum lw_plant_mode before = LW_PLANT_HOLD;
+    int64_t announce_ns = 0;
+    struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), report_period_ns);
+    while (!atomic_load(&live->rt_done)) {
+        lw_program_announce(live->simulation->program, live->main_bus, &announce_ns);
         (void)lw_periodic_wait(&loop);
-        say_mode(live, &timeouts, &stopped);
-        if (lw_stop_signal() != 0)
+        report(live, &before);
+        if (lw_stop_signal() != 0 || atomic_load(&live->bus_failed))
             atomic_store(&live->stopping, true);
     }
+    report(live, &before);
+    return !atomic_load(&live->bus_failed);
 }
 
 static int run_threads(struct live *live)
 {
+    static void *(*const run[])(void *) = {receive, sense, run_plant};
+    enum { THREADS = sizeof run / sizeof run[0] };
     const struct lw_simulation *s = live->simulation;
-    pthread_t rt, rx;
-    if (!lw_program_thread(s->program, &rx, rx_main, live))
-        return EXIT_FAILURE;
-    const bool ok = lw_program_thread(s->program, &rt, rt_main, live);
+    pthread_t thread[THREADS];
+    int started = 0;
+    while (started < THREADS && lw_program_thread(s->program, &thread[started], run[started], live))
+        started++;
+    bool ok = started == THREADS;
     if (ok) {
         lw_program_say(s->program, "ready, %g Hz", s->program->scene.plant.rate_hz);
-        serve(live);
-        pthread_join(rt, NULL);
+        ok = serve(live);
     }
     atomic_store(&live->rt_done, true);
-    pthread_join(rx, NULL);
+    for (int i = 0; i < started; i++)
+        pthread_join(thread[i], NULL);
+    const struct lw_record *newest = lw_health_past(&live->health, 0);
     lw_program_say(s->program, "%.3f s of motion, %lld periods skipped, %lld states not sent, %lld messages refused",
-                   (double)s->arm.tick * s->plant.period_s, (long long)atomic_load(&live->skipped),
-                   (long long)atomic_load(&live->unsent), (long long)lw_bus_refused(live->rx_bus));
+                   (double)s->arm.tick * s->plant.period_s, newest != NULL ? (long long)newest->skipped : 0LL,
+                   (long long)live->health.unsent, (long long)lw_refusals_total(&s->program->refusals));
+    lw_program_write_histogram(s->program, &live->health);
     return ok ? lw_stop_exit_status() : EXIT_FAILURE;
 }
 
 int lw_simulation_live(struct lw_simulation *simulation)
 {
     static struct live live;
+    struct lw_program *program = simulation->program;
     live.simulation = simulation;
+    live.gate = lw_simulation_gate(simulation);
     lw_mailbox_init(&live.command_box, live.command_slots, sizeof live.command_slots[0]);
+    if (!lw_program_go_realtime(program))
+        return EXIT_FAILURE;
     int status = EXIT_FAILURE;
-    if (lw_program_open(simulation->program, &live.rt_bus) == LW_OK &&
-        lw_program_open(simulation->program, &live.rx_bus) == LW_OK &&
-        lw_program_open(simulation->program, &live.sensor_bus) == LW_OK && subscribe(&live) == LW_OK)
+    if (!lw_health_init(&live.health, simulation->plant.period_ns))
+        lw_program_fail(program, "out of memory");
+    else if (lw_program_open(program, &live.rt_bus) == LW_OK && lw_program_open(program, &live.rx_bus) == LW_OK &&
+             lw_program_open(program, &live.main_bus) == LW_OK && subscribe(&live) == LW_OK)
         status = run_threads(&live);
-    lw_bus_close(live.sensor_bus);
+    lw_health_free(&live.health);
+    lw_bus_close(live.main_bus);
     lw_bus_close(live.rx_bus);
     lw_bus_close(live.rt_bus);
     return status;

@@ -20,9 +20,12 @@ static const int64_t patience_ns = 5 * LW_NS_PER_S; // for an answer, once there
 struct lockstep {
     struct lw_simulation *simulation;
     struct lw_bus *bus;
-    bool answered;        // the state published last
-    bool started;         // a first answer came
-    int64_t wanted_since; // CLOCK_MONOTONIC when the state was published first
+    struct lw_gate gate;
+    struct lw_lease lease;
+    struct lw_joint_state state; // published last
+    bool answered;               // the state published last
+    bool started;                // a first answer came
+    int64_t wanted_since;        // CLOCK_MONOTONIC when the state was published first
 };
 
 // Takes the answer to the state published last. The first one must also have seen the scene's obstacles.
@@ -35,8 +38,10 @@ static void on_command(void *user, enum lw_channel channel, const union lw_messa
     const bool sees_world = l->started || command->world.session == s->plant.session;
     if (l->answered || command->state_tick != s->arm.tick || !sees_world)
         return;
-    const int64_t now_ns = s->arm.tick * s->plant.period_ns;
-    l->answered = lw_plant_accept(&s->plant, &s->arm, command, now_ns) == LW_ACCEPTED;
+    const enum lw_verdict verdict = lw_gate_judge(&l->gate, &l->lease, command, l->state.stamp.seq, lw_clock_mono_ns());
+    l->answered = lw_refusals_note(&s->program->refusals, verdict);
+    if (l->answered)
+        lw_plant_obey(&s->arm, command, s->arm.tick * s->plant.period_ns);
     l->started |= l->answered;
 }
 
@@ -45,7 +50,7 @@ static enum lw_status publish(struct lockstep *l)
     enum lw_status status = LW_OK;
     if (!l->started)
         status = lw_simulation_publish_obstacles(l->simulation, l->bus);
-    return status == LW_OK ? lw_simulation_publish_state(l->simulation, l->bus) : status;
+    return status == LW_OK ? lw_simulation_publish_state(l->simulation, l->bus, &l->state) : status;
 }
 
 // Publishes the state until it is answered. False when stopped or given up.
@@ -85,7 +90,7 @@ static bool step(struct lockstep *l)
         return true;
     for (int i = 0; i < ratio; i++) {
         lw_plant_step(&s->plant, &s->arm, s->arm.tick * s->plant.period_ns);
-        if (i < ratio - 1 && lw_simulation_publish_state(s, l->bus) != LW_OK) {
+        if (i < ratio - 1 && lw_simulation_publish_state(s, l->bus, &l->state) != LW_OK) {
             lw_program_fail(s->program, "the bus failed");
             return false;
         }
@@ -100,7 +105,7 @@ static void come_to_rest(struct lockstep *l)
     lw_plant_stop(&s->arm);
     while (!lw_plant_at_rest(&s->arm)) {
         lw_plant_step(&s->plant, &s->arm, s->arm.tick * s->plant.period_ns);
-        if (lw_simulation_publish_state(s, l->bus) != LW_OK)
+        if (lw_simulation_publish_state(s, l->bus, &l->state) != LW_OK)
             return;
     }
 }
@@ -110,6 +115,10 @@ int lw_simulation_lockstep(struct lw_simulation *simulation)
     static struct lockstep lockstep;
     const struct lw_program *program = simulation->program;
     lockstep.simulation = simulation;
+    // The plant waits for its answer, however late: neither age nor start-up matter.
+    lockstep.gate = lw_simulation_gate(simulation);
+    lockstep.gate.open_ns = 0;
+    lockstep.gate.max_lag = INT64_MAX;
     if (lw_program_open(program, &lockstep.bus) != LW_OK)
         return 1;
     bool ok = lw_program_subscribe(program, lockstep.bus, LW_CHANNEL_JOINT_COMMAND, on_command, &lockstep) == LW_OK;

@@ -8,13 +8,34 @@
 // Errors   exit status 0 ok, 1 failed, 2 usage or scene refused, 130 after Ctrl-C.
 #include "simulator/simulation.h"
 
-#include "base/stop.h" // lw_stop_install
+#include "base/clock.h" // lw_clock_mono_ns
+#include "base/stop.h"  // lw_stop_install
 
-enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulation, struct lw_bus *bus)
+#include <string.h> // memcpy
+
+// A controller of the plant before must notice first that its plant is gone.
+static const int64_t start_guard_ns = LW_NS_PER_S / 4;
+
+struct lw_gate lw_simulation_gate(const struct lw_simulation *simulation)
+{
+    const struct lw_plant *plant = &simulation->plant;
+    struct lw_gate gate = {.plant_session = plant->session,
+                           .open_ns = lw_clock_mono_ns() + start_guard_ns,
+                           .lease_ns = LW_LEASE_NS,
+                           .max_lag = 2 * plant->timeout_ns / plant->period_ns};
+    memcpy(gate.velocity, plant->velocity, sizeof gate.velocity);
+    return gate;
+}
+
+enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulation, struct lw_bus *bus,
+                                           struct lw_joint_state *out)
 {
     union lw_message message;
     lw_plant_report(&simulation->plant, &simulation->arm, &message.joint_state);
-    return lw_bus_publish(bus, LW_CHANNEL_JOINT_STATE, &message);
+    const enum lw_status status = lw_bus_publish(bus, LW_CHANNEL_JOINT_STATE, &message);
+    if (out != NULL)
+        *out = message.joint_state;
+    return status;
 }
 
 enum lw_status lw_simulation_publish_obstacles(const struct lw_simulation *simulation, struct lw_bus *bus)

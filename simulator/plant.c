@@ -26,34 +26,13 @@ void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const s
     memcpy(state->q, scene->q0, sizeof state->q);
 }
 
-static enum lw_verdict judge(const struct lw_plant *plant, const struct lw_plant_state *state,
-                             const struct lw_joint_command *command)
+void lw_plant_obey(struct lw_plant_state *state, const struct lw_joint_command *command, int64_t now_ns)
 {
-    const bool same_controller = command->stamp.session == state->command_session;
-    if (command->plant_session != plant->session)
-        return LW_REFUSED_PLANT;
-    if (command->mode != LW_COMMAND_VELOCITY)
-        return LW_REFUSED_IDLE;
-    if (command->state_tick > state->tick ||
-        state->tick - command->state_tick > 2 * plant->timeout_ns / plant->period_ns)
-        return LW_REFUSED_STALE;
-    if (!same_controller && state->mode == LW_PLANT_MOVING)
-        return LW_REFUSED_FOREIGN;
-    return same_controller && command->stamp.seq <= state->command_seq ? LW_REFUSED_OLD : LW_ACCEPTED;
-}
-
-enum lw_verdict lw_plant_accept(const struct lw_plant *plant, struct lw_plant_state *state,
-                                const struct lw_joint_command *command, int64_t now_ns)
-{
-    const enum lw_verdict verdict = judge(plant, state, command);
-    if (verdict != LW_ACCEPTED)
-        return verdict;
     state->mode = LW_PLANT_MOVING;
     state->command_session = command->stamp.session;
     state->command_seq = command->stamp.seq;
     state->command_ns = now_ns;
     memcpy(state->target, command->qd, sizeof state->target);
-    return LW_ACCEPTED;
 }
 
 void lw_plant_stop(struct lw_plant_state *state)

@@ -5,7 +5,7 @@
 // Frames   none.
 // Arrays   one entry a joint, base to wrist 3.
 // Memory   plain data, nothing allocated.
-// Errors   none: a command is accepted or refused with a reason.
+// Errors   none.
 #ifndef LW_SIMULATOR_PLANT_H
 #define LW_SIMULATOR_PLANT_H
 
@@ -35,20 +35,10 @@ struct lw_plant_state {
     int64_t command_ns; // when its newest command was accepted
 };
 
-enum lw_verdict {
-    LW_ACCEPTED,
-    LW_REFUSED_IDLE,    // asks for no motion
-    LW_REFUSED_PLANT,   // meant for another plant
-    LW_REFUSED_STALE,   // computed from a state older than twice the timeout, or from one that never was
-    LW_REFUSED_FOREIGN, // from a second controller while the first one is alive
-    LW_REFUSED_OLD,     // a duplicate, or overtaken by a newer one
-};
-
 void lw_plant_init(struct lw_plant *plant, struct lw_plant_state *state, const struct lw_scene *scene, int64_t session);
 
-// Takes a validated command or says why not.
-enum lw_verdict lw_plant_accept(const struct lw_plant *plant, struct lw_plant_state *state,
-                                const struct lw_joint_command *command, int64_t now_ns);
+// Obeys a command from the next step on; bus/gate.h has judged it.
+void lw_plant_obey(struct lw_plant_state *state, const struct lw_joint_command *command, int64_t now_ns);
 
 // Ramps to rest from the next step on, until a command is accepted.
 void lw_plant_stop(struct lw_plant_state *state);

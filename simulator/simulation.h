@@ -9,11 +9,12 @@
 #ifndef LW_SIMULATOR_SIMULATION_H
 #define LW_SIMULATOR_SIMULATION_H
 
+#include "bus/gate.h"        // struct lw_gate
 #include "program/program.h" // struct lw_program
 #include "simulator/plant.h" // struct lw_plant
 
 struct lw_simulation {
-    const struct lw_program *program;
+    struct lw_program *program;
     struct lw_plant plant;
     struct lw_plant_state arm;
     int64_t last_tick; // plant periods after which the scene is done
@@ -25,8 +26,13 @@ int lw_simulation_live(struct lw_simulation *simulation);
 // Waits for the controller's answer once per controller period. Ends when done, or on SIGINT or SIGTERM.
 int lw_simulation_lockstep(struct lw_simulation *simulation);
 
+// The gate of this plant, shut for a moment from now on.
+struct lw_gate lw_simulation_gate(const struct lw_simulation *simulation);
+
 // Publishes the arm's state, or the scene's obstacles as a perception source would.
-LW_MUST_CHECK enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulation, struct lw_bus *bus);
+//   out  the state as sent, stamp included; NULL = not wanted
+LW_MUST_CHECK enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulation, struct lw_bus *bus,
+                                                         struct lw_joint_state *out);
 LW_MUST_CHECK enum lw_status lw_simulation_publish_obstacles(const struct lw_simulation *simulation,
                                                              struct lw_bus *bus);
 

@@ -12,7 +12,7 @@
 #include "arm/arm.h"    // LW_NJ
 #include "base/stamp.h" // struct lw_stamp
 
-enum lw_plant_mode { LW_PLANT_HOLD, LW_PLANT_MOVING, LW_PLANT_STOPPING };
+enum lw_plant_mode { LW_PLANT_HOLD, LW_PLANT_MOVING, LW_PLANT_STOPPING, LW_PLANT_ENDED };
 
 // Plant -> controller, every plant period.
 struct lw_joint_state {
@@ -37,7 +37,12 @@ enum lw_flag {
     LW_STALE = 16,
     LW_NOT_FINITE = 32,
     LW_WAITING = 64,
+    LW_FOREIGN = 128,
+    LW_WARMING_UP = 256,
 };
+
+// How a law fared in a tick.
+enum lw_law_outcome { LW_LAW_NOT_ASKED, LW_LAW_OK, LW_LAW_NO_NUMBER };
 
 // Nearest pair of control point and obstacle.
 struct lw_nearest {
@@ -54,7 +59,8 @@ struct lw_joint_command {
     int64_t state_tick;
     int64_t state_mono_ns;
     enum lw_command_mode mode;
-    unsigned flags;          // set of enum lw_flag
+    unsigned flags; // set of enum lw_flag
+    enum lw_law_outcome law_outcome;
     double qd[LW_NJ];        // rad/s, the command
     double qd_law[LW_NJ];    // rad/s, wish of the law before the guard
     double q[LW_NJ];         // rad, configuration it was computed for
@@ -68,6 +74,8 @@ struct lw_joint_command {
     int64_t tick;             // 1, 2, 3 ...
     int64_t tick_ns;          // the tick's own time
     int64_t state_age_ns;     // age of the state at tick_ns
+    int64_t input_digest;     // over everything the tick was given
+    int64_t compute_ns;       // wake-up until computed
     int64_t wake_late_ns;     // wake-up after the deadline
     int64_t previous_exec_ns; // wake-up to publish of the previous tick
     int64_t skipped;          // periods skipped since start

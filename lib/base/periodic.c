@@ -33,12 +33,3 @@ int64_t lw_periodic_wait(struct lw_periodic *loop)
     loop->deadline_ns += loop->period_ns;
     return late;
 }
-
-int64_t lw_periodic_phase(int64_t phase_ns, int64_t sample_ns, int64_t period_ns)
-{
-    // Difference of the phases, within half a period either way.
-    const int64_t half = period_ns / 2;
-    const int64_t turned = (sample_ns - phase_ns + half) % period_ns;
-    const int64_t difference = (turned < 0 ? turned + period_ns : turned) - half;
-    return difference < 0 ? phase_ns + difference : phase_ns;
-}

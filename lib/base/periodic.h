@@ -28,11 +28,4 @@ int64_t lw_periodic_wait(struct lw_periodic *loop);
 // Moves deadlines that have passed at now_ns to the next one ahead and counts them.
 void lw_periodic_skip(struct lw_periodic *loop, int64_t now_ns);
 
-// Phase of another periodic sender from the times at which its messages came: they can only come late, so the
-// earliest one within the period counts.
-//   phase_ns   in  phase so far (any time at which a message may come)
-//   sample_ns  in  time at which a message came
-// Returns the earlier of the two phases.
-int64_t lw_periodic_phase(int64_t phase_ns, int64_t sample_ns, int64_t period_ns);
-
 #endif

@@ -35,6 +35,22 @@ bool lw_thread_set_priority(int priority)
     return pthread_setschedparam(pthread_self(), priority > 0 ? SCHED_FIFO : SCHED_OTHER, &param) == 0;
 }
 
+bool lw_thread_bind(int cpu)
+{
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    CPU_SET((size_t)cpu, &set);
+    return pthread_setaffinity_np(pthread_self(), sizeof set, &set) == 0;
+}
+
+bool lw_thread_may_bind(int cpu)
+{
+    cpu_set_t before;
+    if (pthread_getaffinity_np(pthread_self(), sizeof before, &before) != 0 || !lw_thread_bind(cpu))
+        return false;
+    return pthread_setaffinity_np(pthread_self(), sizeof before, &before) == 0;
+}
+
 void lw_thread_prefault_stack(void)
 {
     volatile unsigned char stack[PREFAULT_BYTES];

@@ -18,6 +18,10 @@ bool lw_thread_lock_memory(void);
 // Gives the calling thread SCHED_FIFO at `priority`; 0 gives the normal class back.
 bool lw_thread_set_priority(int priority);
 
+// Binds the calling thread to one CPU; may_bind tells whether that is possible and leaves it as it was.
+bool lw_thread_bind(int cpu);
+bool lw_thread_may_bind(int cpu);
+
 // Touches the stack that a real-time thread will use, so that no page fault comes later.
 void lw_thread_prefault_stack(void);
 

@@ -15,7 +15,6 @@
 #include <arpa/inet.h>  // inet_pton
 #include <errno.h>      // errno
 #include <lcm/lcm.h>    // lcm_*
-#include <stdatomic.h>  // atomic_int_fast64_t
 #include <stddef.h>     // ptrdiff_t
 #include <stdlib.h>     // calloc, getenv
 #include <string.h>     // strerrordesc_np
@@ -26,7 +25,7 @@
 
 enum { CHANNEL_NAME_MAX = 64, NAME_BYTES = LW_NAME_MAX + 2, QUEUE_CAPACITY = 64 };
 
-static const char default_url[] = "udpm://239.255.76.67:7667?ttl=0";
+static const char default_url[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
 struct subscription {
     struct lw_bus *bus;
@@ -44,7 +43,7 @@ struct lw_bus {
     int64_t scene_seq;
     unsigned char buffer[LW_WIRE_MAX];
     struct subscription subscription[LW_CHANNEL_COUNT];
-    atomic_int_fast64_t refused;
+    struct lw_refusals *refusals;
 };
 
 // --- open ---
@@ -125,6 +124,7 @@ enum lw_status lw_bus_open(const struct lw_bus_config *config, struct lw_bus **o
         return LW_E_BUS;
     }
     bus->session = config->session;
+    bus->refusals = config->refusals;
     name_channels(bus, config->name);
     // LCM computes each fingerprint on first use, without a lock: do it before threads start.
     for (int c = 0; c < LW_CHANNEL_COUNT; c++)
@@ -149,10 +149,9 @@ static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *use
     (void)channel;
     struct subscription *s = user;
     union lw_message message;
-    if (lw_wire_decode(s->channel, buf->data, buf->data_size, &message) == LW_OK)
+    const enum lw_status status = lw_wire_decode(s->channel, buf->data, buf->data_size, &message);
+    if (lw_refusals_note(s->bus->refusals, lw_verdict_of(status)))
         s->handler(s->user, s->channel, &message);
-    else
-        atomic_fetch_add_explicit(&s->bus->refused, 1, memory_order_relaxed);
 }
 
 enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler, void *user,
@@ -178,11 +177,6 @@ bool lw_bus_handle(struct lw_bus *bus, int timeout_ms)
     while (handled > 0)
         handled = lcm_handle_timeout(bus->lcm, 0);
     return handled == 0 || errno == EINTR; // a signal only ends the wait
-}
-
-int64_t lw_bus_refused(const struct lw_bus *bus)
-{
-    return atomic_load_explicit(&bus->refused, memory_order_relaxed);
 }
 
 // --- publish ---

@@ -5,12 +5,13 @@
 // Frames   none.
 // Arrays   none.
 // Memory   open and subscribe allocate; publish and handle do not. One thread handles, one publishes.
-// Errors   open and subscribe say what to do in struct lw_error; refused messages are counted, not printed.
+// Errors   open and subscribe say what to do in struct lw_error; refused messages are counted by reason, not printed.
 #ifndef LW_BUS_BUS_H
 #define LW_BUS_BUS_H
 
-#include "base/schema.h" // struct lw_error
-#include "bus/wire.h"    // enum lw_channel, union lw_message
+#include "base/refusal.h" // struct lw_refusals
+#include "base/schema.h"  // struct lw_error
+#include "bus/wire.h"     // enum lw_channel, union lw_message
 
 #include <stdint.h> // int64_t
 
@@ -25,6 +26,7 @@ struct lw_bus_config {
     const char *url;  // NULL = LCM_DEFAULT_URL, else the default: multicast that stays on this host
     const char *name; // robot's prefix of the channels JOINT_STATE, JOINT_COMMAND, GOAL, STOP, SCENE; NULL = none
     int64_t session;  // from lw_clock_session, one per process
+    struct lw_refusals *refusals; // counts what handlers never see
 };
 
 typedef void (*lw_bus_handler)(void *user, enum lw_channel channel, const union lw_message *message);
@@ -51,8 +53,5 @@ struct lw_bus_scene {
     const char *program, *mode, *file, *yaml;
 };
 LW_MUST_CHECK enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scene *scene);
-
-// Messages refused since open, all channels.
-int64_t lw_bus_refused(const struct lw_bus *bus);
 
 #endif

@@ -14,6 +14,7 @@
 #include <leeway_joint_command_t.h>
 #include <leeway_joint_state_t.h>
 #include <leeway_obstacles_t.h>
+#include <leeway_status_t.h>
 #include <leeway_stop_t.h>
 
 #include <stdbool.h> // bool
@@ -87,7 +88,7 @@ static enum lw_status decode_joint_state(const void *data, int size, union lw_me
     memcpy(s.q, w.q, sizeof s.q);
     memcpy(s.qd, w.qd, sizeof s.qd);
     enum lw_status status = check_stamp(&s.stamp);
-    if (status == LW_OK && (w.plant_mode < LW_PLANT_HOLD || w.plant_mode > LW_PLANT_STOPPING))
+    if (status == LW_OK && (w.plant_mode < LW_PLANT_HOLD || w.plant_mode > LW_PLANT_ENDED))
         status = LW_E_ARGUMENT;
     if (status == LW_OK && !is_time(w.tick, w.period_ns))
         status = LW_E_ARGUMENT;
@@ -112,6 +113,7 @@ static int encode_joint_command(void *data, const union lw_message *message)
                                 .state_mono_ns = c->state_mono_ns,
                                 .mode = (int8_t)c->mode,
                                 .flags = (int32_t)c->flags,
+                                .law_outcome = (int8_t)c->law_outcome,
                                 .request_session = c->request.session,
                                 .request_seq = c->request.seq,
                                 .world_session = c->world.session,
@@ -125,6 +127,8 @@ static int encode_joint_command(void *data, const union lw_message *message)
                                 .tick = c->tick,
                                 .tick_ns = c->tick_ns,
                                 .state_age_ns = c->state_age_ns,
+                                .input_digest = c->input_digest,
+                                .compute_ns = c->compute_ns,
                                 .wake_late_ns = c->wake_late_ns,
                                 .previous_exec_ns = c->previous_exec_ns,
                                 .skipped = c->skipped};
@@ -258,9 +262,37 @@ static enum lw_status decode_stop(const void *data, int size, union lw_message *
     return status;
 }
 
-// --- the table ---
+// --- status ---
 
-enum { FINGERPRINT_BYTES = 8 };
+static int encode_status(void *data, const union lw_message *message)
+{
+    const struct lw_report *r = &message->report;
+    leeway_status_t w = {.h = stamp_to_wire(&r->stamp),
+                         .state = (int8_t)r->state,
+                         .faults = (int32_t)r->faults,
+                         .faults_ever = (int32_t)r->faults_ever,
+                         .realtime = (int32_t)r->realtime,
+                         .period_ns = r->period_ns,
+                         .ticks = r->ticks,
+                         .skipped = r->skipped,
+                         .stale_ticks = r->stale_ticks,
+                         .unsent = r->unsent,
+                         .peer_session = r->peer_session,
+                         .taken = r->taken,
+                         .missed = r->missed,
+                         .takeovers = r->takeovers,
+                         .minor_faults = r->minor_faults,
+                         .major_faults = r->major_faults,
+                         .allocations = r->allocations,
+                         .distance = r->distance};
+    memcpy(w.refused, r->refused, sizeof r->refused);
+    memcpy(w.wake_late_ns, r->wake_late_ns, sizeof w.wake_late_ns);
+    memcpy(w.exec_ns, r->exec_ns, sizeof w.exec_ns);
+    memcpy(w.age_ns, r->age_ns, sizeof w.age_ns);
+    return leeway_status_t_encode(data, 0, LW_WIRE_MAX, &w);
+}
+
+// --- the table ---
 
 static int size_joint_state(void)
 {
@@ -282,6 +314,10 @@ static int size_stop(void)
 {
     return leeway_stop_t_encoded_size(&(leeway_stop_t){0});
 }
+static int size_status(void)
+{
+    return leeway_status_t_encoded_size(&(leeway_status_t){0});
+}
 
 static const struct wire_row {
     const char *name;
@@ -298,6 +334,10 @@ static const struct wire_row {
                               decode_obstacles},
     [LW_CHANNEL_GOAL] = {"GOAL", size_goal, __leeway_goal_t_get_hash, encode_goal, decode_goal},
     [LW_CHANNEL_STOP] = {"STOP", size_stop, __leeway_stop_t_get_hash, encode_stop, decode_stop},
+    [LW_CHANNEL_WORLD] = {"WORLD", size_obstacles, __leeway_obstacles_t_get_hash, encode_obstacles, decode_obstacles},
+    // No program here acts on another's status: these are sent only.
+    [LW_CHANNEL_STATUS] = {"STATUS", size_status, __leeway_status_t_get_hash, encode_status, NULL},
+    [LW_CHANNEL_PLANT_STATUS] = {"PLANT_STATUS", size_status, __leeway_status_t_get_hash, encode_status, NULL},
 };
 
 const char *lw_wire_channel_name(enum lw_channel channel)
@@ -320,7 +360,7 @@ enum lw_status lw_wire_decode(enum lw_channel channel, const void *data, uint32_
     // Size before decode: a packet without a channel name arrives with a size near 2^32.
     if (size != lw_wire_size(channel))
         return LW_E_SIZE;
-    return rows[channel].decode(data, (int)size, message);
+    return rows[channel].decode ? rows[channel].decode(data, (int)size, message) : LW_E_DECODE;
 }
 
 uint32_t lw_wire_encode(enum lw_channel channel, const union lw_message *message, void *data)

@@ -10,6 +10,7 @@
 #define LW_BUS_WIRE_H
 
 #include "arm/joint.h"       // struct lw_joint_state, struct lw_joint_command, struct lw_request
+#include "bus/report.h"      // struct lw_report
 #include "collision/world.h" // struct lw_obstacle_change
 
 #include <stdint.h> // uint32_t
@@ -20,6 +21,9 @@ enum lw_channel {
     LW_CHANNEL_OBSTACLES,
     LW_CHANNEL_GOAL,
     LW_CHANNEL_STOP,
+    LW_CHANNEL_WORLD,
+    LW_CHANNEL_STATUS,
+    LW_CHANNEL_PLANT_STATUS,
     LW_CHANNEL_COUNT
 };
 
@@ -30,8 +34,9 @@ union lw_message {
     struct lw_stamp stamp; // every member starts with its stamp
     struct lw_joint_state joint_state;
     struct lw_joint_command joint_command;
-    struct lw_obstacle_change obstacles;
-    struct lw_request request; // GOAL and STOP
+    struct lw_obstacle_change obstacles; // OBSTACLES and WORLD
+    struct lw_request request;           // GOAL and STOP
+    struct lw_report report;             // STATUS and PLANT_STATUS; only encoded here
 };
 
 // Name of a channel without a robot's prefix.

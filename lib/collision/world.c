@@ -8,7 +8,8 @@
 // Errors   see world.h.
 #include "collision/world.h"
 
-#include "base/vec.h" // lw_vec_*
+#include "base/digest.h" // lw_digest_*
+#include "base/vec.h"    // lw_vec_*
 
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
@@ -90,6 +91,17 @@ static struct lw_sender *find_sender(struct lw_world *world, int64_t session)
     return sender;
 }
 
+static int64_t digest(const struct lw_world *world)
+{
+    uint64_t digest = lw_digest_int(LW_DIGEST_START, world->count);
+    for (int i = 0; i < world->count; i++) {
+        const struct lw_obstacle *o = &world->obstacle[i];
+        digest = lw_digest_doubles(lw_digest_int(digest, o->id), o->p, 3);
+        digest = lw_digest_doubles(digest, &o->radius, 1);
+    }
+    return (int64_t)digest;
+}
+
 enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     struct lw_world next = *world;
@@ -113,6 +125,7 @@ enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_c
     // Hearing anything at all is version 1: an empty world is known, not unheard of.
     next.version += changed || next.version == 0;
     next.last = change->stamp;
+    next.digest = digest(&next);
     *world = next;
     return LW_OK;
 }

@@ -41,6 +41,7 @@ struct lw_sender {
 struct lw_world {
     int64_t version;      // number of changes of the set so far; 0 = nothing heard
     struct lw_stamp last; // session and seq of the newest message taken in
+    int64_t digest;       // of the obstacles, in their order
     int count;
     struct lw_obstacle obstacle[LW_WORLD_MAX];
     struct lw_sender sender[LW_SENDERS_MAX]; // senders heard last; the oldest makes room

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Program: what controller and simulator have in common: command line, scene, bus, and words for people.
+// Program: what controller and simulator have in common: command line (options.c), scene, bus, words for people, and
+// what they ask of the system to keep time (realtime.c).
 //
 // Units    none.
 // Frames   none.
@@ -9,12 +10,16 @@
 #ifndef LW_PROGRAM_PROGRAM_H
 #define LW_PROGRAM_PROGRAM_H
 
-#include "bus/bus.h"     // struct lw_bus_config
-#include "scene/scene.h" // struct lw_scene
+#include "bus/bus.h"        // struct lw_bus_config
+#include "program/health.h" // struct lw_health
+#include "scene/scene.h"    // struct lw_scene
 
 #include <pthread.h> // pthread_t
 
 enum { LW_SETS_MAX = 64 };
+
+// What a program asks of the system: what it can get, all of it or nothing.
+enum lw_realtime_wish { LW_REALTIME_AUTO, LW_REALTIME_REQUIRE, LW_REALTIME_OFF };
 
 struct lw_program {
     // Set by the program itself.
@@ -30,7 +35,14 @@ struct lw_program {
     bool until_done; // end after the scene's duration
     int pace;        // messages per second in lockstep
     bool quiet;
+    enum lw_realtime_wish realtime_wish;
+    int cpu;               // that the real-time thread is bound to, -1 = any
+    int priority;          // SCHED_FIFO of the real-time thread; its receive thread has one less
+    const char *histogram; // file for statistics at the end, NULL = none
     struct lw_bus_config bus_config;
+
+    unsigned realtime; // set of enum lw_realtime: what the system granted
+    struct lw_refusals refusals;
 
     // From the scene file and --set.
     struct lw_scene scene;
@@ -53,8 +65,21 @@ LW_MUST_CHECK enum lw_status lw_program_subscribe(const struct lw_program *progr
 //   due_ns  in/out  CLOCK_MONOTONIC of the next time; 0 = now
 void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, int64_t *due_ns);
 
-// Asks for locked memory and SCHED_FIFO for the calling thread; says so when the system refuses.
-void lw_program_go_realtime(const struct lw_program *program, int priority);
+// Asks the system for all that keeps time, before any thread starts: memory locked and kept, CPUs kept awake,
+// SCHED_FIFO and the CPU asked for. Says what it refuses; false when the user required it.
+LW_MUST_CHECK bool lw_program_go_realtime(struct lw_program *program);
+
+// Makes the calling thread the real-time thread, or (`behind` = 1) one that serves it, as far as the system grants it.
+void lw_program_realtime_thread(const struct lw_program *program, int behind);
+void lw_program_normal_thread(void);
+
+// Publishes what a program's health is on its channel, 20 times a second.
+//   report  in  state, distance and faults of its own; the rest is filled in
+LW_MUST_CHECK enum lw_status lw_program_report(const struct lw_program *program, struct lw_bus *bus,
+                                               struct lw_health *health, struct lw_report *report);
+
+// Writes the statistics asked for by --histogram; says when it cannot.
+void lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health);
 
 // Starts a thread; says so when there is none to be had.
 LW_MUST_CHECK bool lw_program_thread(const struct lw_program *program, pthread_t *thread, void *(*run)(void *),

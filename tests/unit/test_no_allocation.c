@@ -143,7 +143,7 @@ static enum lw_status one_period(struct rig *rig, int64_t seq)
     const uint32_t size = lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &m, data);
     if (status == LW_OK)
         status = lw_wire_decode(LW_CHANNEL_JOINT_COMMAND, data, size, &heard);
-    (void)lw_plant_accept(&rig->plant, &rig->arm, &heard.joint_command, seq);
+    lw_plant_obey(&rig->arm, &heard.joint_command, seq);
     lw_plant_step(&rig->plant, &rig->arm, seq);
     return status;
 }
@@ -154,7 +154,7 @@ static void tick_plant_and_wire_allocate_nothing(void **state)
     static struct rig rig;
     rig.scene = lw_scene_defaults(LW_UR5);
     rig.scene.plant.rate_hz = rig.scene.rate_hz;
-    assert_int_equal(lw_controller_init(&rig.config, &rig.state, &rig.scene), LW_OK);
+    assert_int_equal(lw_controller_init(&rig.config, &rig.state, &rig.scene, 2), LW_OK);
     lw_plant_init(&rig.plant, &rig.arm, &rig.scene, 1);
     rig.world = (struct lw_world){.version = 1, .count = 3};
     for (int i = 0; i < 3; i++)

@@ -90,22 +90,6 @@ static void a_late_loop_does_not_burst(void **state)
     assert_int_equal(loop.deadline_ns, first + (loop.skipped + 1) * period);
 }
 
-// Messages that come late by anything below half a period show the phase of the earliest, whichever comes first.
-static void phase_is_that_of_the_earliest_message(void **state)
-{
-    (void)state;
-    static const int64_t late[] = {3100, 400, 2500, 0, 3900, 1};
-    for (int64_t grid = -5 * period; grid <= 5 * period; grid += 5 * period) {
-        int64_t phase = grid + late[0];
-        for (int k = 1; k < 6; k++)
-            phase = lw_periodic_phase(phase, grid + k * period + late[k] * period / 8000, period);
-        assert_int_equal((phase - grid) % period, 0);
-    }
-    // An earlier message moves the phase back, a later one leaves it.
-    assert_int_equal(lw_periodic_phase(100, 100 + 7 * period - 1, period), 99);
-    assert_int_equal(lw_periodic_phase(100, 100 - 3 * period + 1, period), 100);
-}
-
 // The clocks run forwards, and two sessions differ.
 static void clocks_and_sessions(void **state)
 {
@@ -127,7 +111,6 @@ int main(void)
         cmocka_unit_test(any_lateness_ends_on_the_grid_just_ahead),
         cmocka_unit_test(waiting_keeps_absolute_deadlines),
         cmocka_unit_test(a_late_loop_does_not_burst),
-        cmocka_unit_test(phase_is_that_of_the_earliest_message),
         cmocka_unit_test(clocks_and_sessions),
     };
     return cmocka_run_group_tests_name("periodic", tests, NULL, NULL);

@@ -43,122 +43,25 @@ static struct lw_joint_command command(int64_t session, int64_t seq, double qd)
                                      .qd = {qd, -qd, qd / 2, 0, qd, -qd}};
 }
 
-// Offers a command as computed from the arm's present state.
-static enum lw_verdict offer(struct rig *rig, const struct lw_joint_command *c, int64_t now_ns)
-{
-    struct lw_joint_command fresh = *c;
-    fresh.state_tick = rig->arm.tick;
-    return lw_plant_accept(&rig->plant, &rig->arm, &fresh, now_ns);
-}
-
 static void accept(struct rig *rig, int64_t session, int64_t seq, double qd, int64_t now_ns)
 {
     const struct lw_joint_command c = command(session, seq, qd);
-    assert_int_equal(offer(rig, &c, now_ns), LW_ACCEPTED);
+    lw_plant_obey(&rig->arm, &c, now_ns);
 }
 
-// Refused for this reason, and the arm is byte for byte as it was.
-static void refuse(struct rig *rig, const struct lw_joint_command *c, enum lw_verdict verdict)
-{
-    struct rig before;
-    memcpy(&before, rig, sizeof before); // padding too
-    assert_int_equal(offer(rig, c, 12345), verdict);
-    assert_same_bits(rig, &before, sizeof *rig);
-}
-
-static void time_out(struct rig *rig)
-{
-    lw_plant_step(&rig->plant, &rig->arm, rig->arm.command_ns + rig->plant.timeout_ns + 1);
-    assert_int_equal(rig->arm.mode, LW_PLANT_STOPPING);
-}
-
-// --- verdicts ---
+// --- commands ---
 
 static void an_accepted_command_is_in_force(void **state)
 {
     (void)state;
     struct rig rig = start();
     const struct lw_joint_command c = command(FIRST, 41, 0.5);
-    assert_int_equal(offer(&rig, &c, 777), LW_ACCEPTED);
+    lw_plant_obey(&rig.arm, &c, 777);
     assert_int_equal(rig.arm.mode, LW_PLANT_MOVING);
     assert_int_equal(rig.arm.command_session, FIRST);
     assert_int_equal(rig.arm.command_seq, 41);
     assert_int_equal(rig.arm.command_ns, 777);
     assert_all_near(rig.arm.target, c.qd, LW_NJ, 0);
-}
-
-static void a_command_for_another_plant_is_refused(void **state)
-{
-    (void)state;
-    struct rig rig = start();
-    struct lw_joint_command c = command(FIRST, 1, 0.5);
-    c.plant_session = PLANT - 1;
-    refuse(&rig, &c, LW_REFUSED_PLANT);
-    accept(&rig, FIRST, 1, 0.5, 0);
-    c.stamp.seq = 2;
-    refuse(&rig, &c, LW_REFUSED_PLANT);
-}
-
-static void an_idle_command_moves_nothing(void **state)
-{
-    (void)state;
-    struct rig rig = start();
-    struct lw_joint_command c = command(FIRST, 1, 0.5);
-    c.mode = LW_COMMAND_IDLE;
-    refuse(&rig, &c, LW_REFUSED_IDLE);
-    assert_int_equal(rig.arm.mode, LW_PLANT_HOLD);
-}
-
-// A second controller has to wait until the first one is silent; then any seq of it is new.
-static void a_second_controller_waits_for_the_first_to_cease(void **state)
-{
-    (void)state;
-    struct rig rig = start();
-    accept(&rig, FIRST, 1000, 0.5, 0);
-    const struct lw_joint_command c = command(SECOND, 5, -0.5);
-    refuse(&rig, &c, LW_REFUSED_FOREIGN);
-    time_out(&rig);
-    assert_int_equal(offer(&rig, &c, 0), LW_ACCEPTED);
-    const struct lw_joint_command late = command(FIRST, 1001, 0.5);
-    refuse(&rig, &late, LW_REFUSED_FOREIGN);
-}
-
-// A command from a state two timeouts old is taken, one from an older state or from the future is not.
-static void a_command_from_an_old_state_is_refused(void **state)
-{
-    (void)state;
-    struct rig rig = start();
-    accept(&rig, FIRST, 1, 0.5, 0);
-    for (int k = 0; k < 50; k++)
-        lw_plant_step(&rig.plant, &rig.arm, 0);
-    const int64_t oldest = rig.arm.tick - 2 * rig.plant.timeout_ns / rig.plant.period_ns;
-    struct lw_joint_command c = command(FIRST, 2, 0.4);
-    c.state_tick = oldest - 1;
-    assert_int_equal(lw_plant_accept(&rig.plant, &rig.arm, &c, 0), LW_REFUSED_STALE);
-    c.state_tick = rig.arm.tick + 1;
-    assert_int_equal(lw_plant_accept(&rig.plant, &rig.arm, &c, 0), LW_REFUSED_STALE);
-    assert_int_equal(rig.arm.command_seq, 1);
-    c.state_tick = oldest;
-    assert_int_equal(lw_plant_accept(&rig.plant, &rig.arm, &c, 0), LW_ACCEPTED);
-}
-
-// Duplicates and late commands are refused, while moving and after a timeout; a newer one is obeyed again.
-static void a_command_is_obeyed_once_and_in_order(void **state)
-{
-    (void)state;
-    struct rig rig = start();
-    accept(&rig, FIRST, 5, 0.5, 0);
-    for (int64_t seq = 1; seq <= 5; seq++) {
-        const struct lw_joint_command c = command(FIRST, seq, 9);
-        refuse(&rig, &c, LW_REFUSED_OLD);
-    }
-    accept(&rig, FIRST, 6, 0.5, 0);
-    accept(&rig, FIRST, 90, 0.5, 0); // a gap is a loss, not a reason
-    time_out(&rig);
-    const struct lw_joint_command same = command(FIRST, 90, 0.5);
-    refuse(&rig, &same, LW_REFUSED_OLD);
-    accept(&rig, FIRST, 91, 0.5, 0);
-    assert_int_equal(rig.arm.mode, LW_PLANT_MOVING);
 }
 
 // --- timeout ---
@@ -231,7 +134,7 @@ static void without_limits_it_follows_exactly(void **state)
     for (int64_t k = 1; k <= 1000; k++) {
         struct lw_joint_command c = command(FIRST, k, 0);
         random_fill(&random, -50, 50, c.qd, LW_NJ);
-        assert_int_equal(offer(&rig, &c, 0), LW_ACCEPTED);
+        lw_plant_obey(&rig.arm, &c, 0);
         lw_plant_step(&rig.plant, &rig.arm, 0);
         for (int j = 0; j < LW_NJ; j++)
             q[j] += 0.002 * c.qd[j];
@@ -257,7 +160,7 @@ static void limits_hold_and_are_used(void **state)
         if (k % 7 == 0) // now and then commands cease
             lw_plant_stop(&rig.arm);
         else
-            assert_int_equal(offer(&rig, &c, 0), LW_ACCEPTED);
+            lw_plant_obey(&rig.arm, &c, 0);
         lw_plant_step(&rig.plant, &rig.arm, 0);
         for (int j = 0; j < LW_NJ; j++) {
             const double target = k % 7 ? c.qd[j] : 0, top = rig.plant.velocity[j];
@@ -350,11 +253,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_accepted_command_is_in_force),
-        cmocka_unit_test(a_command_for_another_plant_is_refused),
-        cmocka_unit_test(an_idle_command_moves_nothing),
-        cmocka_unit_test(a_second_controller_waits_for_the_first_to_cease),
-        cmocka_unit_test(a_command_from_an_old_state_is_refused),
-        cmocka_unit_test(a_command_is_obeyed_once_and_in_order),
         cmocka_unit_test(the_timeout_is_exact_to_the_nanosecond),
         cmocka_unit_test(it_comes_to_rest_when_commands_cease),
         cmocka_unit_test(it_holds_before_the_first_command),

@@ -11,7 +11,7 @@
 #include "controller/tick.h"
 #include "helpers.h"
 
-enum { PLANT = 100, OPERATOR = 7, OTHER = 8 };
+enum { PLANT = 100, CONTROLLER = 200, OPERATOR = 7, OTHER = 8 };
 static const int64_t ms = 1000000;
 static const double zero[LW_NJ] = {0};
 
@@ -34,9 +34,12 @@ static struct rig *start(void)
     rig.scene = lw_scene_defaults(LW_UR5);
     const double q0[LW_NJ] = {0, -1.2, 1.6, -0.4, 0.3, 0}, goal[3] = {0.25, -0.6, 0.25};
     memcpy(rig.scene.goal, goal, sizeof goal);
-    assert_int_equal(lw_controller_init(&rig.config, &rig.state, &rig.scene), LW_OK);
-    rig.joint =
-        (struct lw_joint_state){.stamp = {1, 2, PLANT, 4}, .mode = LW_PLANT_MOVING, .tick = 5, .period_ns = 2 * ms};
+    assert_int_equal(lw_controller_init(&rig.config, &rig.state, &rig.scene, CONTROLLER), LW_OK);
+    rig.joint = (struct lw_joint_state){.stamp = {1, 2, PLANT, 4},
+                                        .mode = LW_PLANT_MOVING,
+                                        .command_session = CONTROLLER,
+                                        .tick = 5,
+                                        .period_ns = 2 * ms};
     memcpy(rig.joint.q, q0, sizeof q0);
     rig.world.version = 1;
     return &rig;
@@ -115,7 +118,7 @@ static void init_refuses_unknown_robots_and_laws(void **state)
         struct lw_scene scene = lw_scene_defaults(LW_UR5);
         scene.robot = bad[i][0];
         scene.law.name = bad[i][1];
-        assert_int_equal(lw_controller_init(&config, &s, &scene), LW_E_ARGUMENT);
+        assert_int_equal(lw_controller_init(&config, &s, &scene, CONTROLLER), LW_E_ARGUMENT);
         assert_same_bits(&config, &config_before, sizeof config);
         assert_same_bits(&s, &s_before, sizeof s);
     }
@@ -254,7 +257,7 @@ static void a_stale_state_brakes(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct rig *rig = start();
         rig->scene.rate_hz = cases[i].rate_hz;
-        assert_int_equal(lw_controller_init(&rig->config, &rig->state, &rig->scene), LW_OK);
+        assert_int_equal(lw_controller_init(&rig->config, &rig->state, &rig->scene, CONTROLLER), LW_OK);
         rig->age_ns = cases[i].limit_ns;
         tick(rig);
         assert_int_equal(rig->out.flags & LW_STALE, 0);

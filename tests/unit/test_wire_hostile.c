@@ -150,7 +150,7 @@ static bool obstacles_keep_their_ranges(const struct lw_obstacle_change *c)
 
 static bool state_keeps_its_ranges(const struct lw_joint_state *s)
 {
-    return within(s->q, LW_NJ, 1e6) && within(s->qd, LW_NJ, 1e6) && (unsigned)s->mode <= LW_PLANT_STOPPING &&
+    return within(s->q, LW_NJ, 1e6) && within(s->qd, LW_NJ, 1e6) && (unsigned)s->mode <= LW_PLANT_ENDED &&
            s->period_ns > 0 && s->period_ns <= 1000000000 && s->tick >= 0;
 }
 
@@ -163,9 +163,12 @@ static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
     case LW_CHANNEL_JOINT_STATE: return stamped && state_keeps_its_ranges(&m->joint_state);
     case LW_CHANNEL_JOINT_COMMAND:
         return stamped && c->state_tick >= 0 && within(c->qd, LW_NJ, 1e6) && (unsigned)c->mode <= LW_COMMAND_VELOCITY;
-    case LW_CHANNEL_OBSTACLES: return stamped && obstacles_keep_their_ranges(&m->obstacles);
+    case LW_CHANNEL_OBSTACLES:
+    case LW_CHANNEL_WORLD: return stamped && obstacles_keep_their_ranges(&m->obstacles);
     case LW_CHANNEL_GOAL: return stamped && within(m->request.goal, 3, 100);
     case LW_CHANNEL_STOP:
+    case LW_CHANNEL_STATUS:
+    case LW_CHANNEL_PLANT_STATUS:
     case LW_CHANNEL_COUNT: break;
     }
     return stamped;

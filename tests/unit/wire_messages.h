@@ -43,7 +43,7 @@ static inline void fill(struct random *random, double limit, double *values, int
 static inline void make_command(struct random *random, struct lw_joint_command *c)
 {
     c->mode = (enum lw_command_mode)random_below(random, 2);
-    c->flags = (unsigned)random_below(random, 128);
+    c->flags = (unsigned)random_below(random, 512);
     c->plant_session = any_int(random);
     c->state_seq = any_int(random);
     c->state_tick = any_int(random) & INT64_MAX;
@@ -73,7 +73,7 @@ static inline union lw_message make(struct random *random, enum lw_channel chann
     m.stamp = any_stamp(random);
     switch (channel) {
     case LW_CHANNEL_JOINT_STATE:
-        m.joint_state.mode = (enum lw_plant_mode)random_below(random, 3);
+        m.joint_state.mode = (enum lw_plant_mode)random_below(random, 4);
         m.joint_state.command_session = any_int(random);
         m.joint_state.command_seq = any_int(random);
         m.joint_state.tick = random_below(random, 1000000);
@@ -82,9 +82,12 @@ static inline union lw_message make(struct random *random, enum lw_channel chann
         fill(random, 1e6, m.joint_state.qd, LW_NJ);
         break;
     case LW_CHANNEL_JOINT_COMMAND: make_command(random, &m.joint_command); break;
-    case LW_CHANNEL_OBSTACLES: make_obstacles(random, &m.obstacles); break;
+    case LW_CHANNEL_OBSTACLES:
+    case LW_CHANNEL_WORLD: make_obstacles(random, &m.obstacles); break;
     case LW_CHANNEL_GOAL: fill(random, 100, m.request.goal, 3); break;
     case LW_CHANNEL_STOP: m.request.kind = LW_REQUEST_STOP; break;
+    case LW_CHANNEL_STATUS:
+    case LW_CHANNEL_PLANT_STATUS:
     case LW_CHANNEL_COUNT: break;
     }
     return m;
