@@ -94,6 +94,7 @@ class Commands(Messages):
     state_mono_ns: Ints
     mode: Ints
     flags: Ints
+    law_outcome: Ints
     qd: Floats
     qd_law: Floats
     q: Floats
@@ -111,6 +112,8 @@ class Commands(Messages):
     tick: Ints
     tick_ns: Ints
     state_age_ns: Ints
+    input_digest: Ints
+    compute_ns: Ints
     wake_late_ns: Ints
     previous_exec_ns: Ints
     skipped: Ints
