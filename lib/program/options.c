@@ -82,6 +82,20 @@ static void parse_realtime(struct lw_program *program, const char *text, struct 
     program->realtime_wish = (enum lw_realtime_wish)found;
 }
 
+// Options about keeping time.
+static error_t parse_realtime_option(int key, char *arg, struct argp_state *state)
+{
+    struct lw_program *program = state->input;
+    switch (key) {
+    case KEY_REALTIME: parse_realtime(program, arg, state); break;
+    case KEY_CPU: program->cpu = parse_number("cpu", arg, 0, CPU_SETSIZE - 1, state); break;
+    case KEY_PRIORITY: program->priority = parse_number("priority", arg, PRIORITY_MIN, PRIORITY_MAX, state); break;
+    case KEY_HISTOGRAM: program->histogram = arg; break;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
 static error_t parse_option(int key, char *arg, struct argp_state *state)
 {
     struct lw_program *program = state->input;
@@ -98,10 +112,6 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
     case 'q': program->quiet = true; break;
     case KEY_UNTIL_DONE: program->until_done = true; break;
     case KEY_PACE: program->pace = parse_number("pace", arg, 1, INT_MAX, state); break;
-    case KEY_REALTIME: parse_realtime(program, arg, state); break;
-    case KEY_CPU: program->cpu = parse_number("cpu", arg, 0, CPU_SETSIZE - 1, state); break;
-    case KEY_PRIORITY: program->priority = parse_number("priority", arg, PRIORITY_MIN, PRIORITY_MAX, state); break;
-    case KEY_HISTOGRAM: program->histogram = arg; break;
     case KEY_HELP_SCENE: lw_scene_describe(stdout); exit(0);
     case ARGP_KEY_ARG:
         if (program->path != NULL)
@@ -112,7 +122,7 @@ static error_t parse_option(int key, char *arg, struct argp_state *state)
         if (program->path == NULL)
             argp_error(state, "expected a SCENE, as in %s scenarios/c1.yaml", state->name);
         break;
-    default: return ARGP_ERR_UNKNOWN;
+    default: return parse_realtime_option(key, arg, state);
     }
     return 0;
 }
