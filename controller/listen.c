@@ -45,11 +45,11 @@ void *lw_live_receive(void *user)
 
 static void on_obstacles(void *user, enum lw_channel channel, const union lw_message *message)
 {
-    (void)channel;
     struct lw_live *live = user;
     const enum lw_status status = lw_world_apply(&live->world, &message->obstacles);
     if (!lw_refusals_note(&live->control->program->refusals, lw_verdict_of(status)))
         return;
+    lw_heard_note(&live->heard, channel, message);
     struct lw_world *slot = lw_mailbox_slot(&live->world_box);
     *slot = live->world;
     lw_mailbox_publish(&live->world_box);
@@ -57,11 +57,11 @@ static void on_obstacles(void *user, enum lw_channel channel, const union lw_mes
 
 static void on_request(void *user, enum lw_channel channel, const union lw_message *message)
 {
-    (void)channel;
     struct lw_live *live = user;
     // Repetitions stay out of the mailbox, where they could replace a newer request that no tick has taken yet.
     if (!lw_request_is_new(&live->requests, &message->request))
         return;
+    lw_heard_note(&live->heard, channel, message);
     struct lw_request *slot = lw_mailbox_slot(&live->request_box);
     *slot = message->request;
     lw_mailbox_publish(&live->request_box);

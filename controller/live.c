@@ -28,7 +28,7 @@ static enum lw_run_state run_state(const struct lw_live *live, const struct lw_j
 }
 
 // Statistics and STATUS, once.
-static void report(struct lw_live *live)
+static void report(struct lw_live *live, int64_t now_ns)
 {
     const struct lw_program *program = live->control->program;
     const struct lw_record *newest = lw_health_collect(&live->health);
@@ -38,6 +38,8 @@ static void report(struct lw_live *live)
                                .distance = newest->command.nearest.distance};
     if (lw_program_report(program, live->status_bus, &live->health, &report) != LW_OK)
         lw_program_say(program, "STATUS could not be sent");
+    if (program->postmortem != NULL)
+        lw_postmortem_watch(&live->postmortem, program, live->status_bus, &live->health, &live->heard, now_ns);
 }
 
 // Reports, announcements and signals, until the real-time thread is done. True when all went well.
@@ -48,13 +50,13 @@ static bool serve(struct lw_live *live)
     while (!atomic_load(&live->rt_done)) {
         lw_program_announce(live->control->program, live->status_bus, &announce_ns);
         (void)lw_periodic_wait(&loop);
-        report(live);
+        report(live, lw_clock_mono_ns());
         if (lw_stop_signal() != 0 || atomic_load(&live->bus_failed))
             atomic_store(&live->stopping, true);
         if (lw_stop_count() > 1)
             atomic_store(&live->abandoned, true);
     }
-    report(live);
+    report(live, INT64_MAX);
     return !atomic_load(&live->bus_failed);
 }
 
@@ -100,6 +102,7 @@ int lw_control_live(struct lw_control *control)
     lw_mailbox_init(&live.state_box, live.state_slots, sizeof live.state_slots[0]);
     lw_mailbox_init(&live.world_box, live.world_slots, sizeof live.world_slots[0]);
     lw_mailbox_init(&live.request_box, live.request_slots, sizeof live.request_slots[0]);
+    lw_heard_init(&live.heard);
     if (!lw_program_go_realtime(control->program))
         return EXIT_FAILURE;
     int status = EXIT_FAILURE;

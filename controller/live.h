@@ -16,6 +16,7 @@
 
 #include "base/mailbox.h" // struct lw_mailbox
 #include "controller/control.h"
+#include "controller/postmortem.h" // struct lw_heard
 
 #include <stdatomic.h> // atomic_bool
 
@@ -36,6 +37,8 @@ struct lw_live {
     _Alignas(LW_CACHE_LINE) struct lw_world world_slots[LW_MAILBOX_SLOTS];
     _Alignas(LW_CACHE_LINE) struct lw_request request_slots[LW_MAILBOX_SLOTS];
     struct lw_health health;           // rt -> main
+    struct lw_heard heard;             // world -> main
+    struct lw_postmortem postmortem;   // main
     struct lw_lease lease;             // rx: the plant heard
     struct lw_world world;             // world: its working copy
     struct lw_request_memory requests; // world: those put into the mailbox

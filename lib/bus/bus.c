@@ -6,45 +6,23 @@
 // Arrays   none.
 // Memory   see bus.h.
 // Errors   see bus.h.
-#define _GNU_SOURCE // strerrordesc_np
-#include "bus/bus.h"
+#define _GNU_SOURCE         // strerrordesc_np
+#include "bus/connection.h" // struct lw_bus
 
 #include "base/build.h" // LW_BUILD
 #include "base/clock.h" // lw_clock_mono_ns, lw_clock_utime
 
 #include <arpa/inet.h>  // inet_pton
 #include <errno.h>      // errno
-#include <lcm/lcm.h>    // lcm_*
 #include <stddef.h>     // ptrdiff_t
 #include <stdlib.h>     // calloc, getenv
 #include <string.h>     // strerrordesc_np
 #include <sys/socket.h> // socket, connect
 #include <unistd.h>     // close
 
-#include <leeway_scene_t.h>
-
-enum { CHANNEL_NAME_MAX = 64, NAME_BYTES = LW_NAME_MAX + 2, QUEUE_CAPACITY = 64 };
+enum { QUEUE_CAPACITY = 64 };
 
 static const char default_url[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
-
-struct subscription {
-    struct lw_bus *bus;
-    enum lw_channel channel;
-    lw_bus_handler handler;
-    void *user;
-};
-
-struct lw_bus {
-    lcm_t *lcm;
-    int64_t session;
-    char name[NAME_BYTES];
-    char channel_name[LW_CHANNEL_COUNT][CHANNEL_NAME_MAX];
-    int64_t seq[LW_CHANNEL_COUNT];
-    int64_t scene_seq;
-    unsigned char buffer[LW_WIRE_MAX];
-    struct subscription subscription[LW_CHANNEL_COUNT];
-    struct lw_refusals *refusals;
-};
 
 // --- open ---
 
@@ -104,8 +82,9 @@ static void name_channels(struct lw_bus *bus, const char *name)
     if (name != NULL && name[0] != '\0')
         snprintf(bus->name, sizeof bus->name, "%.30s_", name);
     for (int c = 0; c < LW_CHANNEL_COUNT; c++)
-        snprintf(bus->channel_name[c], CHANNEL_NAME_MAX, "%s%s", c == LW_CHANNEL_OBSTACLES ? "" : bus->name,
+        snprintf(bus->channel_name[c], LW_CHANNEL_NAME_MAX, "%s%s", c == LW_CHANNEL_OBSTACLES ? "" : bus->name,
                  lw_wire_channel_name((enum lw_channel)c));
+    snprintf(bus->scene_channel, LW_CHANNEL_NAME_MAX, "%sSCENE", bus->name);
 }
 
 enum lw_status lw_bus_open(const struct lw_bus_config *config, struct lw_bus **out, struct lw_error *error)
@@ -147,7 +126,7 @@ void lw_bus_close(struct lw_bus *bus)
 static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     (void)channel;
-    struct subscription *s = user;
+    struct lw_subscription *s = user;
     union lw_message message;
     const enum lw_status status = lw_wire_decode(s->channel, buf->data, buf->data_size, &message);
     if (lw_refusals_note(s->bus->refusals, lw_verdict_of(status)))
@@ -157,8 +136,8 @@ static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *use
 enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler, void *user,
                                 struct lw_error *error)
 {
-    struct subscription *s = &bus->subscription[channel];
-    *s = (struct subscription){.bus = bus, .channel = channel, .handler = handler, .user = user};
+    struct lw_subscription *s = &bus->subscription[channel];
+    *s = (struct lw_subscription){.bus = bus, .channel = channel, .handler = handler, .user = user};
     lcm_subscription_t *made = lcm_subscribe(bus->lcm, bus->channel_name[channel], handle_raw, s);
     if (made == NULL) {
         snprintf(error->text, sizeof error->text,
@@ -202,7 +181,7 @@ static char *unconst(const char *text)
     return out;
 }
 
-enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scene *scene)
+leeway_scene_t lw_bus_scene_wire(struct lw_bus *bus, const struct lw_bus_scene *scene)
 {
     const struct lw_stamp stamp = make_stamp(bus, ++bus->scene_seq);
     leeway_scene_t w = {.h = {stamp.utime, stamp.mono_ns, stamp.session, stamp.seq}};
@@ -211,7 +190,11 @@ enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scen
     w.mode = unconst(scene->mode);
     w.file = unconst(scene->file);
     w.yaml = unconst(scene->yaml);
-    char channel[CHANNEL_NAME_MAX];
-    snprintf(channel, sizeof channel, "%sSCENE", bus->name);
-    return leeway_scene_t_publish(bus->lcm, channel, &w) == 0 ? LW_OK : LW_E_BUS;
+    return w;
+}
+
+enum lw_status lw_bus_publish_scene(struct lw_bus *bus, const struct lw_bus_scene *scene)
+{
+    const leeway_scene_t w = lw_bus_scene_wire(bus, scene);
+    return leeway_scene_t_publish(bus->lcm, bus->scene_channel, &w) == 0 ? LW_OK : LW_E_BUS;
 }

@@ -18,7 +18,17 @@
 #include <string.h> // strspn
 
 enum { EXIT_FAILED = 1, EXIT_USAGE = 2 };
-enum { KEY_URL = 256, KEY_HELP_SCENE, KEY_UNTIL_DONE, KEY_PACE, KEY_REALTIME, KEY_CPU, KEY_PRIORITY, KEY_HISTOGRAM };
+enum {
+    KEY_URL = 256,
+    KEY_HELP_SCENE,
+    KEY_UNTIL_DONE,
+    KEY_PACE,
+    KEY_REALTIME,
+    KEY_CPU,
+    KEY_PRIORITY,
+    KEY_HISTOGRAM,
+    KEY_POSTMORTEM
+};
 
 const char *argp_program_version = LW_BUILD;
 
@@ -28,11 +38,15 @@ enum { PACE = 3000 };
 // Above what a system itself runs at real-time priority, below its watchdogs.
 enum { PRIORITY = 80, PRIORITY_MIN = 2, PRIORITY_MAX = 98 };
 
-// The first two are the simulator's alone: the controller's table starts behind them.
-enum { SIMULATOR_OPTIONS = 2 };
-static const struct argp_option argp_options[] = {
+static const struct argp_option simulator_options[] = {
     {"until-done", KEY_UNTIL_DONE, NULL, 0, "End after the scene's duration_s, as lockstep does, not when stopped.", 0},
     {"pace", KEY_PACE, "N", 0, "In lockstep, N messages a second at most, so that a recorder can follow (3000).", 0},
+    {0}};
+static const struct argp_option controller_options[] = {
+    {"post-mortem", KEY_POSTMORTEM, "DIR", 0,
+     "Folder for the last two seconds before a fault that brakes the arm, as a log; none writes no file (runs).", 0},
+    {0}};
+static const struct argp_option common_options[] = {
     {"set", 's', "KEY=VALUE", 0, "Replace a key of the scene, as in --set law.gamma=2. Repeatable.", 0},
     {"lcm-url", KEY_URL, "URL", 0, "LCM bus. Default: $LCM_DEFAULT_URL, else multicast that stays on this host.", 0},
     {"name", 'n', "NAME", 0, "Robot's name: its channels become NAME_JOINT_STATE and so on.", 0},
@@ -48,6 +62,7 @@ static const struct argp_option argp_options[] = {
     {"quiet", 'q', NULL, 0, "Errors only.", 0},
     {"help-scene", KEY_HELP_SCENE, NULL, 0, "List every key that a scene may have.", 0},
     {0}};
+enum { OPTIONS_MAX = 32 };
 
 // NOLINTBEGIN(concurrency-mt-unsafe): argp and exit are called before any thread starts
 
@@ -90,6 +105,7 @@ static error_t parse_realtime_option(int key, char *arg, struct argp_state *stat
     case KEY_REALTIME: parse_realtime(program, arg, state); break;
     case KEY_CPU: program->cpu = parse_number("cpu", arg, 0, CPU_SETSIZE - 1, state); break;
     case KEY_PRIORITY: program->priority = parse_number("priority", arg, PRIORITY_MIN, PRIORITY_MAX, state); break;
+    case KEY_POSTMORTEM: program->postmortem = strcmp(arg, "none") == 0 ? NULL : arg; break;
     case KEY_HISTOGRAM: program->histogram = arg; break;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -139,19 +155,25 @@ static char *scene_text(const struct lw_scene *scene)
     return fclose(to) == 0 ? text : NULL;
 }
 
+// Appends a table that ends with an empty row; returns the number of rows so far.
+static size_t append(struct argp_option *table, size_t count, const struct argp_option *rows)
+{
+    for (; rows->name != NULL; rows++)
+        table[count++] = *rows;
+    return count;
+}
+
 static void parse_command_line(struct lw_program *program, int argc, char **argv)
 {
-    const struct argp argp = {argp_options + (program->is_simulator ? 0 : SIMULATOR_OPTIONS),
-                              parse_option,
-                              "SCENE",
-                              program->summary,
-                              NULL,
-                              NULL,
-                              NULL};
+    struct argp_option table[OPTIONS_MAX] = {0};
+    const size_t own = append(table, 0, program->is_simulator ? simulator_options : controller_options);
+    (void)append(table, own, common_options);
+    const struct argp argp = {.options = table, .parser = parse_option, .args_doc = "SCENE", .doc = program->summary};
     argp_err_exit_status = EXIT_USAGE;
     program->pace = PACE;
     program->priority = PRIORITY;
     program->cpu = -1;
+    program->postmortem = "runs";
     argp_parse(&argp, argc, argv, 0, NULL, program);
 }
 

@@ -66,16 +66,21 @@ enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_
     return status;
 }
 
+struct lw_bus_scene lw_program_scene(const struct lw_program *program)
+{
+    return (struct lw_bus_scene){.program = program->name,
+                                 .mode = program->lockstep ? "lockstep" : "realtime",
+                                 .file = program->path,
+                                 .yaml = program->yaml};
+}
+
 void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, int64_t *due_ns)
 {
     const int64_t now_ns = lw_clock_mono_ns();
     if (now_ns < *due_ns)
         return;
     *due_ns = now_ns + LW_NS_PER_S;
-    const struct lw_bus_scene scene = {.program = program->name,
-                                       .mode = program->lockstep ? "lockstep" : "realtime",
-                                       .file = program->path,
-                                       .yaml = program->yaml};
+    const struct lw_bus_scene scene = lw_program_scene(program);
     if (lw_bus_publish_scene(bus, &scene) != LW_OK)
         lw_program_say(program, "SCENE could not be sent; a log may lack it");
 }

@@ -36,9 +36,10 @@ struct lw_program {
     int pace;        // messages per second in lockstep
     bool quiet;
     enum lw_realtime_wish realtime_wish;
-    int cpu;               // that the real-time thread is bound to, -1 = any
-    int priority;          // SCHED_FIFO of the real-time thread; its receive thread has one less
-    const char *histogram; // file for statistics at the end, NULL = none
+    int cpu;                // that the real-time thread is bound to, -1 = any
+    int priority;           // SCHED_FIFO of the real-time thread; its receive thread has one less
+    const char *postmortem; // folder of the files written after a fault, NULL = none
+    const char *histogram;  // file for statistics at the end, NULL = none
     struct lw_bus_config bus_config;
 
     unsigned realtime; // set of enum lw_realtime: what the system granted
@@ -60,6 +61,9 @@ void lw_program_fail(const struct lw_program *program, const char *format, ...) 
 LW_MUST_CHECK enum lw_status lw_program_open(const struct lw_program *program, struct lw_bus **bus);
 LW_MUST_CHECK enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_bus *bus,
                                                   enum lw_channel channel, lw_bus_handler handler, void *user);
+
+// What the program runs, for logs.
+struct lw_bus_scene lw_program_scene(const struct lw_program *program);
 
 // Publishes the scene in force on SCENE, for the log, when a second has passed since it did so last.
 //   due_ns  in/out  CLOCK_MONOTONIC of the next time; 0 = now

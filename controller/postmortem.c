@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Writing the post-mortem log.
+//
+// Units    see postmortem.h.
+// Frames   see postmortem.h.
+// Arrays   none.
+// Memory   see postmortem.h.
+// Errors   see postmortem.h.
+#define _GNU_SOURCE // strerrordesc_np
+#include "controller/postmortem.h"
+
+#include "base/clock.h" // lw_clock_mono_ns
+#include "bus/log.h"    // lw_log_*
+
+#include <errno.h>    // errno
+#include <string.h>   // strerrordesc_np
+#include <sys/stat.h> // mkdir
+#include <time.h>     // strftime
+
+enum { PATH_MAX_BYTES = 512, FOLDER_MODE = 0777 };
+static const int64_t aftermath_ns = LW_NS_PER_S / 5;
+
+// --- what was heard ---
+
+void lw_heard_init(struct lw_heard *heard)
+{
+    pthread_mutex_init(&heard->lock, NULL);
+}
+
+void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union lw_message *message)
+{
+    pthread_mutex_lock(&heard->lock);
+    struct lw_heard_message *slot = &heard->newest[heard->next];
+    // The oldest makes room: what it changed stays in the world before.
+    if (heard->count == LW_HEARD_MAX && slot->channel == LW_CHANNEL_OBSTACLES)
+        (void)(lw_world_apply(&heard->before, &slot->message.obstacles) == LW_OK); // it was taken once already
+    *slot = (struct lw_heard_message){.channel = channel, .message = *message, .time_ns = lw_clock_mono_ns()};
+    heard->next = (heard->next + 1) % LW_HEARD_MAX;
+    heard->count += heard->count < LW_HEARD_MAX;
+    pthread_mutex_unlock(&heard->lock);
+}
+
+// --- writing ---
+
+struct writer {
+    struct lw_log *log;
+    int64_t utime_offset_us; // wall clock minus CLOCK_MONOTONIC
+};
+
+static void write_at(struct writer *w, enum lw_channel channel, const union lw_message *message, int64_t time_ns)
+{
+    lw_log_write(w->log, channel, message, time_ns / 1000 + w->utime_offset_us);
+}
+
+// The obstacles known before the messages that follow: one message for each run of obstacles of one owner.
+static void write_before(struct writer *w, const struct lw_world *world, int64_t time_ns)
+{
+    for (int i = 0; i < world->count;) {
+        union lw_message message = {.obstacles = {.op = LW_UPSERT}};
+        struct lw_obstacle_change *change = &message.obstacles;
+        const int64_t owner = world->obstacle[i].session;
+        change->stamp = (struct lw_stamp){.session = owner, .seq = 1 + i};
+        while (i < world->count && world->obstacle[i].session == owner && change->count < LW_CHANGE_MAX)
+            change->obstacle[change->count++] = world->obstacle[i++];
+        write_at(w, LW_CHANNEL_OBSTACLES, &message, time_ns);
+    }
+}
+
+// Messages heard up to a time, from the one numbered `from` on. Returns the number of the next.
+static int write_heard(struct writer *w, const struct lw_heard *heard, int from, int64_t until_ns)
+{
+    for (; from < heard->count; from++) {
+        const int oldest = heard->count < LW_HEARD_MAX ? 0 : heard->next;
+        const struct lw_heard_message *m = &heard->newest[(oldest + from) % LW_HEARD_MAX];
+        if (m->time_ns > until_ns)
+            break;
+        write_at(w, m->channel, &m->message, m->time_ns);
+    }
+    return from;
+}
+
+// Every tick: its state when it is a new one, then its command.
+static void write_ticks(struct writer *w, const struct lw_health *health, const struct lw_heard *heard)
+{
+    int back = 0, next = 0;
+    while (lw_health_past(health, back) != NULL)
+        back++;
+    if (back > 0)
+        write_before(w, &heard->before, lw_health_past(health, back - 1)->time_ns);
+    while (--back >= 0) {
+        const struct lw_record *record = lw_health_past(health, back);
+        next = write_heard(w, heard, next, record->time_ns);
+        union lw_message message = {.joint_state = record->state};
+        if (record->fresh)
+            write_at(w, LW_CHANNEL_JOINT_STATE, &message, record->time_ns - record->age_ns);
+        message.joint_command = record->command;
+        write_at(w, LW_CHANNEL_JOINT_COMMAND, &message, record->time_ns + record->exec_ns);
+    }
+}
+
+static const char *fault_name(unsigned fault)
+{
+    return fault & LW_FAULT_PEER_TIMEOUT ? "peer-timeout" : fault & LW_FAULT_LEASE ? "lease" : "bad-input";
+}
+
+static void make_path(const struct lw_program *program, unsigned fault, char path[PATH_MAX_BYTES])
+{
+    char when[32];
+    const time_t now = time(NULL);
+    struct tm local;
+    strftime(when, sizeof when, "%Y%m%d-%H%M%S", localtime_r(&now, &local));
+    snprintf(path, PATH_MAX_BYTES, "%s/postmortem-%s-%s.lcm", program->postmortem, when, fault_name(fault));
+}
+
+static void write_file(const struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,
+                       const struct lw_health *health, struct lw_heard *heard)
+{
+    char path[PATH_MAX_BYTES];
+    struct writer w = {.utime_offset_us = lw_clock_utime() - lw_clock_mono_ns() / 1000};
+    make_path(program, postmortem->fault, path);
+    enum lw_status status = LW_E_IO;
+    if (mkdir(program->postmortem, FOLDER_MODE) == 0 || errno == EEXIST)
+        status = lw_log_open(path, bus, &w.log);
+    if (status == LW_OK) {
+        const struct lw_bus_scene scene = lw_program_scene(program);
+        pthread_mutex_lock(&heard->lock);
+        lw_log_write_scene(w.log, &scene, lw_clock_utime());
+        write_ticks(&w, health, heard);
+        pthread_mutex_unlock(&heard->lock);
+        status = lw_log_close(w.log);
+    }
+    if (status == LW_OK)
+        lw_program_say(program, "fault %s braked the arm; the last %d s: leeway report %s",
+                       fault_name(postmortem->fault), LW_HEALTH_PAST_S, path);
+    else
+        lw_program_fail(program, "%s: cannot be written: %s", path, strerrordesc_np(errno));
+}
+
+void lw_postmortem_watch(struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,
+                         const struct lw_health *health, struct lw_heard *heard, int64_t now_ns)
+{
+    const struct lw_record *newest = lw_health_past(health, 0);
+    const unsigned faults = newest != NULL ? newest->faults & ~postmortem->seen : 0;
+    if (faults != 0 && postmortem->fault == 0) {
+        postmortem->seen |= faults;
+        postmortem->fault = faults;
+        postmortem->due_ns = newest->time_ns + aftermath_ns;
+    }
+    if (postmortem->fault == 0 || now_ns < postmortem->due_ns)
+        return;
+    write_file(postmortem, program, bus, health, heard);
+    postmortem->fault = 0;
+}
