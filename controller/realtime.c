@@ -44,9 +44,8 @@ static const struct lw_arrival *compute(struct loop *loop)
     return arrival;
 }
 
-static unsigned faults(const struct lw_joint_command *command, const struct lw_joint_state *joint)
+static unsigned faults(const struct lw_joint_command *command, bool expected)
 {
-    const bool expected = joint->stamp.session != 0 && joint->mode != LW_PLANT_ENDED;
     return (expected && (command->flags & LW_STALE) ? LW_FAULT_PEER_TIMEOUT : 0u) |
            (command->flags & LW_FOREIGN ? LW_FAULT_LEASE : 0u) |
            (command->flags & LW_NOT_FINITE ? LW_FAULT_BAD_INPUT : 0u);
@@ -71,7 +70,10 @@ static const struct lw_arrival *step(struct loop *loop)
     record->lease = arrival->lease;
     record->state = arrival->joint;
     record->command = *command;
-    record->faults = faults(command, &arrival->joint);
+    record->expected = arrival->joint.stamp.session != 0 && arrival->joint.mode != LW_PLANT_ENDED;
+    if (!record->expected)
+        record->age_ns = 0;
+    record->faults = faults(command, record->expected);
     lw_health_note(&loop->live->health, record);
     return arrival;
 }

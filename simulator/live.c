@@ -87,7 +87,8 @@ static void obey(struct loop *loop)
     struct lw_record *record = &loop->record;
     struct lw_plant_state *arm = &live->simulation->arm;
     const struct arrival *arrival = lw_mailbox_take(&live->command_box, &record->fresh);
-    record->age_ns = record->time_ns - arrival->arrival_ns;
+    record->expected = arm->mode == LW_PLANT_MOVING;
+    record->age_ns = record->expected ? record->time_ns - arrival->arrival_ns : 0;
     record->lease = arrival->lease;
     record->command = arrival->command;
     if (atomic_load(&live->stopping))

@@ -97,11 +97,12 @@ static void add(struct lw_health *health, const struct lw_record *record)
         return;
     }
     health->ticks++;
-    health->stale_ticks += !record->fresh;
+    health->stale_ticks += record->expected && !record->fresh;
     health->unsent += !record->sent;
     count_in(&health->wake, record->wake_late_ns);
     count_in(&health->exec, record->exec_ns);
-    count_in(&health->age, record->age_ns);
+    if (record->expected)
+        count_in(&health->age, record->age_ns);
 }
 
 const struct lw_record *lw_health_collect(struct lw_health *health)

@@ -25,7 +25,8 @@ struct lw_record {
     int64_t time_ns; // wake-up, CLOCK_MONOTONIC
     int64_t wake_late_ns;
     int64_t exec_ns;
-    int64_t age_ns;  // of the other side's newest message
+    int64_t age_ns;  // of the other side's newest message, 0 = not expected
+    bool expected;   // the other side has been heard and has not taken its leave: its silence counts
     int64_t skipped; // periods, since start
     bool fresh;      // a message came since the tick before
     bool sent;
