@@ -49,13 +49,13 @@ def _is_group(address: str) -> bool:
         return False
 
 
-def open_bus(url: str) -> lcm.LCM:
-    """Open a bus.
+def address(url: str) -> tuple[str, int]:
+    """Return multicast group and port of a URL.
 
     Raises
     ------
     BusError
-        The URL is not of the form udpm://ADDRESS:PORT, or there is no multicast route.
+        The URL is not of the form udpm://GROUP:PORT.
     """
     match = re.fullmatch(r"udpm://([0-9.]+):(\d{1,5})(\?.*)?", url)
     if match is None or not _is_group(match[1]) or not 0 < int(match[2]) < 1 << 16:
@@ -63,10 +63,22 @@ def open_bus(url: str) -> lcm.LCM:
             "LCM URL: expected udpm://GROUP:PORT?ttl=N with a multicast group, "
             f'as in {DEFAULT_URL}, found "{url}"'
         )
+    return match[1], int(match[2])
+
+
+def open_bus(url: str) -> lcm.LCM:
+    """Open a bus.
+
+    Raises
+    ------
+    BusError
+        The URL is not of the form udpm://GROUP:PORT, or there is no multicast route.
+    """
+    target = address(url)
     try:
         # Ask the kernel for a route before LCM does, which would print a page of its own.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect((match[1], int(match[2])))
+            probe.connect(target)
     except (OSError, OverflowError) as error:
         raise BusError(
             f"no multicast route for {url} ({error}); for this host alone: sudo ip link set lo "

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from leeway import cli_machine
 from leeway.options import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_USAGE, Common, command, fail
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ obstacle_app = typer.Typer(
     help="Put obstacles on the bus, as a sensor would.", no_args_is_help=True
 )
 app.add_typer(obstacle_app, name="obstacle")
+cli_machine.register(app)
 
 SceneArg = Annotated[
     Path, typer.Argument(metavar="SCENE", help="Scene file, as scenarios/c1.yaml.")

@@ -1,0 +1,41 @@
+"""Commands of `leeway` that look at the machine and the running programs; they change nothing."""
+
+from __future__ import annotations
+
+import json
+
+import typer
+
+from leeway.options import EXIT_FAILED, EXIT_USAGE, Common, command, fail
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this file."""
+    command(app, "doctor", "leeway doctor")(doctor)
+
+
+def _group(url: str | None) -> str:
+    """Return the multicast group of the bus."""
+    try:
+        from leeway import bus
+    except ImportError:
+        # The doctor has a finding for an LCM that does not load.
+        return "239.255.76.67"
+    try:
+        return bus.address(bus.resolve_url(url))[0]
+    except bus.BusError as error:
+        fail(str(error), EXIT_USAGE)
+
+
+def doctor(*, common: Common) -> None:
+    """Say what this machine lacks, and the command that mends it; warnings are no failure."""
+    from leeway.doctor import Machine, examine, print_findings, to_json
+
+    findings = examine(Machine(group=_group(common.url)))
+    counts = to_json(findings)
+    if common.as_json:
+        print(json.dumps(counts, indent=2))
+    else:
+        print_findings(findings, common.quiet)
+    if counts["problems"]:
+        raise typer.Exit(EXIT_FAILED)
