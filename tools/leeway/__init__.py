@@ -9,9 +9,33 @@ Units are SI, angles radians; positions are in the base frame of the arm (its DH
 (4, 4)
 """
 
-from leeway._native import BUILD
-from leeway.arm import Arm
-from leeway.logs.log import read_log
-from leeway.scene import Run, Scene, load_scene, simulate
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from leeway._native import BUILD
+    from leeway.arm import Arm
+    from leeway.logs.log import read_log
+    from leeway.scene import Run, Scene, load_scene, simulate
 
 __all__ = ["BUILD", "Arm", "Run", "Scene", "load_scene", "read_log", "simulate"]
+
+# Modules are loaded when a name of theirs is first used: `leeway stop` need not wait for NumPy.
+_HOMES = {
+    "leeway._native": ("BUILD",),
+    "leeway.arm": ("Arm",),
+    "leeway.logs.log": ("read_log",),
+    "leeway.scene": ("Run", "Scene", "load_scene", "simulate"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOMES.items():
+        if name in names:
+            globals()[name] = getattr(importlib.import_module(module), name)
+            return globals()[name]
+    raise AttributeError(f"module 'leeway' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

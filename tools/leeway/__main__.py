@@ -1,5 +1,15 @@
-"""`python -m leeway` is the command `leeway`."""
+"""`leeway` and `python -m leeway`."""
 
-from leeway.cli import main
+from leeway import interrupt
 
-main()
+
+def main() -> None:
+    """Entry point: the command line, whose imports take a moment."""
+    interrupt.end_quietly()
+    from leeway.cli import app
+
+    app()
+
+
+if __name__ == "__main__":
+    main()

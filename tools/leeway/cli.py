@@ -2,7 +2,6 @@
 
 import json
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -86,12 +85,20 @@ def run(
     common: Common,
 ) -> None:
     """Run a scene: lcm-logger, simulator and controller as processes, recorded and summarised."""
+    from leeway.run import LOG_FOLDER, drop_empty, take_log_name
     from leeway.summary import print_table
 
-    path = log or Path("runs") / f"{scene.stem}-{time.strftime('%Y%m%d-%H%M%S')}.lcm"
-    if path.exists() and not force:
-        fail(f"{path} exists: choose another --log, or --force", EXIT_USAGE)
-    analysis, wall = _record(scene, path, sets or [], lockstep, common)
+    if log and log.exists() and not force:
+        fail(f"{log} exists: choose another --log, or --force", EXIT_USAGE)
+    try:
+        path = log or take_log_name(scene.stem)
+    except OSError as error:
+        fail(f"{LOG_FOLDER}: cannot write a log there: {error.strerror}")
+    try:
+        analysis, wall = _record(scene, path, sets or [], lockstep, common)
+    finally:
+        if log is None:
+            drop_empty(path)
     if common.as_json:
         print(json.dumps({**analysis.to_json(), "log": str(path), "wall_s": wall}, indent=2))
     elif not common.quiet:
@@ -410,8 +417,3 @@ def bench(*, common: Common) -> None:
         print(json.dumps(results, indent=2))
     elif not common.quiet:
         print_results(results)
-
-
-def main() -> None:
-    """Entry point."""
-    app()

@@ -10,7 +10,20 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-EXIT_FAILED, EXIT_USAGE, EXIT_LOSS, EXIT_INTERRUPTED = 1, 2, 3, 130
+from leeway import interrupt
+from leeway.interrupt import EXIT_INTERRUPTED
+
+__all__ = [
+    "EXIT_FAILED",
+    "EXIT_INTERRUPTED",
+    "EXIT_LOSS",
+    "EXIT_USAGE",
+    "Common",
+    "command",
+    "fail",
+]
+
+EXIT_FAILED, EXIT_USAGE, EXIT_LOSS = 1, 2, 3
 
 
 def check_name(name: str | None) -> str | None:
@@ -48,6 +61,7 @@ def command(group: typer.Typer, name: str, example: str, **settings: Any) -> Cal
         @functools.wraps(function)
         def call(**values: Any) -> None:
             common = Common(**{p.name: values.pop(p.name) for p in shared})
+            interrupt.raise_again()
             function(common=common, **values)
 
         call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
@@ -27,6 +29,7 @@ START_PATIENCE_S = 15.0
 REST_PATIENCE_S = 2.0
 NEVER_MOVED = -1.0
 PACE = 3000
+LOG_FOLDER = Path("runs")
 
 
 class RunFailed(Exception):
@@ -98,6 +101,30 @@ class _Watch:
         bus_tools.handle(self.bus, POLL_S)
 
 
+def take_log_name(scene: str) -> Path:
+    """Make an empty log named after the scene and now, with -2 and so on when that is taken.
+
+    Raises
+    ------
+    OSError
+        The folder or the file cannot be made.
+    """
+    stem = f"{scene}-{time.strftime('%Y%m%d-%H%M%S')}"
+    LOG_FOLDER.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        path = LOG_FOLDER / f"{stem}{f'-{number}' if number > 1 else ''}.lcm"
+        with suppress(FileExistsError):
+            path.touch(exist_ok=False)
+            break
+    return path
+
+
+def drop_empty(log: Path) -> None:
+    """Give a name back that `take_log_name` took and nothing was recorded under."""
+    if log.exists() and log.stat().st_size == 0:
+        log.unlink()
+
+
 def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> float:
     """Run a scene as processes and record it.
 
@@ -153,7 +180,9 @@ def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> 
     config.log.parent.mkdir(parents=True, exist_ok=True)
     if config.log.exists() and not config.log.is_file():
         raise OSError(errno.EINVAL, "not a regular file", str(config.log))
-    config.log.unlink(missing_ok=True)  # an old log would pass for the new one's first event
+    # An old log would pass for the new one's first event; an empty one keeps the name.
+    if config.log.exists() and config.log.stat().st_size > 0:
+        config.log.unlink()
     # A recorder that waits for the processor loses what its short queue cannot hold.
     logger = Child("lcm-logger", "-q", "-f", f"--lcm-url={url}", str(config.log), ahead=True)
     children.append(logger)
