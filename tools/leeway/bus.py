@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import ipaddress
 import os
 import re
@@ -100,6 +101,21 @@ def handle(bus: lcm.LCM, seconds: float) -> None:
         bus.handle()
 
 
+@functools.cache
+def _size(kind: Any) -> int:
+    return len(kind().encode())
+
+
+def decode(kind: Any, data: bytes) -> Any | None:
+    """Return a message of one of the types of fixed size; None when it is no such message."""
+    if len(data) != _size(kind):
+        return None
+    try:
+        return kind.decode(data)
+    except ValueError:
+        return None
+
+
 def header(session: int, seq: int) -> Any:
     """Return a stamp of this process."""
     h = wire.header_t()
@@ -135,11 +151,8 @@ def send_until_echoed(
     found: list[Any] = []
 
     def on_command(_: str, data: bytes) -> None:
-        try:
-            command = wire.joint_command_t.decode(data)
-        except ValueError:
-            return
-        if not found and is_echo(command):
+        command = decode(wire.joint_command_t, data)
+        if command is not None and not found and is_echo(command):
             found.append(command)
 
     bus.subscribe(command_channel, on_command)

@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 import lcm
 from leeway_lcm import leeway as wire
@@ -83,9 +82,8 @@ class _Watch:
         subscription.set_queue_capacity(1)
 
     def _on_state(self, _: str, data: bytes) -> None:
-        try:
-            state: Any = wire.joint_state_t.decode(data)
-        except ValueError:
+        state = bus_tools.decode(wire.joint_state_t, data)
+        if state is None:
             return
         self.motion_s = state.tick * state.period_ns * 1e-9
         self.at_rest = all(v == 0 for v in state.qd)
