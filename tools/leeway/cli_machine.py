@@ -1,8 +1,8 @@
 """Commands of `leeway` that look at the machine and the running programs; they change nothing."""
 
-from __future__ import annotations
-
 import json
+import sys
+from typing import Annotated
 
 import typer
 
@@ -12,6 +12,7 @@ from leeway.options import EXIT_FAILED, EXIT_USAGE, Common, command, fail
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
     command(app, "doctor", "leeway doctor")(doctor)
+    command(app, "status", "leeway status --watch")(status)
 
 
 def _group(url: str | None) -> str:
@@ -39,3 +40,32 @@ def doctor(*, common: Common) -> None:
         print_findings(findings, common.quiet)
     if counts["problems"]:
         raise typer.Exit(EXIT_FAILED)
+
+
+def status(
+    watching: Annotated[
+        bool, typer.Option("--watch", "-w", help="Refresh in place until Ctrl-C.")
+    ] = False,
+    *,
+    common: Common,
+) -> None:
+    """Show how controller and simulator fare: state, faults, timing, refusals."""
+    from rich.console import Console
+
+    from leeway import bus, watch
+
+    if watching and (common.silent or not sys.stdout.isatty()):
+        fail("--watch needs a terminal, and neither --json nor --quiet", EXIT_USAGE)
+    try:
+        ear = watch.Ear(bus.resolve_url(common.url), common.name)
+    except bus.BusError as error:
+        fail(str(error))
+    if watching:
+        watch.watch(ear)
+    senders = ear.look()
+    if not senders:
+        fail(watch.silence(ear))
+    if common.as_json:
+        print(json.dumps({"programs": [sender.to_json() for sender in senders]}, indent=2))
+    elif not common.quiet:
+        Console().print(watch.table(senders))

@@ -185,4 +185,5 @@ def idle_states(machine: Machine) -> Finding:
 def isolated(machine: Machine) -> Finding:
     """Processors set apart from normal scheduling; a note, not a judgement."""
     names = machine.read("sys/devices/system/cpu/isolated")
-    return Finding(OK, f"isolated CPUs: {names or 'none'}")
+    said = f"{names}; --cpu binds a program to one" if names else "none"
+    return Finding(OK, f"isolated CPUs: {said}")
