@@ -292,6 +292,66 @@ static int encode_status(void *data, const union lw_message *message)
     return leeway_status_t_encode(data, 0, LW_WIRE_MAX, &w);
 }
 
+static bool none_negative(const int64_t *counts, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (counts[i] < 0)
+            return false;
+    return true;
+}
+
+static bool is_report(const leeway_status_t *w)
+{
+    const int64_t counts[] = {w->ticks, w->skipped, w->stale_ticks, w->unsent,       w->peer_session,
+                              w->taken, w->missed,  w->takeovers,   w->minor_faults, w->major_faults};
+    return w->state >= LW_STARTING && w->state <= LW_ENDING && w->period_ns > 0 && w->period_ns <= period_max_ns &&
+           none_negative(counts, (int)(sizeof counts / sizeof counts[0])) &&
+           none_negative(w->refused, LEEWAY_STATUS_T_NREASONS) && w->allocations >= -1; // -1 = cannot count
+}
+
+static struct lw_report report_from_wire(const leeway_status_t *w)
+{
+    struct lw_report r = {.stamp = stamp_from_wire(&w->h),
+                          .state = (enum lw_run_state)w->state,
+                          .faults = (unsigned)w->faults,
+                          .faults_ever = (unsigned)w->faults_ever,
+                          .realtime = (unsigned)w->realtime,
+                          .period_ns = w->period_ns,
+                          .ticks = w->ticks,
+                          .skipped = w->skipped,
+                          .stale_ticks = w->stale_ticks,
+                          .unsent = w->unsent,
+                          .peer_session = w->peer_session,
+                          .taken = w->taken,
+                          .missed = w->missed,
+                          .takeovers = w->takeovers,
+                          .minor_faults = w->minor_faults,
+                          .major_faults = w->major_faults,
+                          .allocations = w->allocations,
+                          .distance = w->distance};
+    memcpy(r.refused, w->refused, sizeof r.refused);
+    memcpy(r.wake_late_ns, w->wake_late_ns, sizeof r.wake_late_ns);
+    memcpy(r.exec_ns, w->exec_ns, sizeof r.exec_ns);
+    memcpy(r.age_ns, w->age_ns, sizeof r.age_ns);
+    return r;
+}
+
+static enum lw_status decode_status(const void *data, int size, union lw_message *message)
+{
+    leeway_status_t w;
+    if (leeway_status_t_decode(data, 0, size, &w) < 0)
+        return LW_E_DECODE;
+    const struct lw_report r = report_from_wire(&w);
+    enum lw_status status = check_stamp(&r.stamp);
+    if (status == LW_OK && !is_report(&w))
+        status = LW_E_ARGUMENT;
+    if (status == LW_OK && !lw_all_finite(&w.distance, 1))
+        status = LW_E_NOT_FINITE;
+    if (status == LW_OK)
+        message->report = r;
+    return status;
+}
+
 // --- the table ---
 
 static int size_joint_state(void)
@@ -335,9 +395,8 @@ static const struct wire_row {
     [LW_CHANNEL_GOAL] = {"GOAL", size_goal, __leeway_goal_t_get_hash, encode_goal, decode_goal},
     [LW_CHANNEL_STOP] = {"STOP", size_stop, __leeway_stop_t_get_hash, encode_stop, decode_stop},
     [LW_CHANNEL_WORLD] = {"WORLD", size_obstacles, __leeway_obstacles_t_get_hash, encode_obstacles, decode_obstacles},
-    // No program here acts on another's status: these are sent only.
-    [LW_CHANNEL_STATUS] = {"STATUS", size_status, __leeway_status_t_get_hash, encode_status, NULL},
-    [LW_CHANNEL_PLANT_STATUS] = {"PLANT_STATUS", size_status, __leeway_status_t_get_hash, encode_status, NULL},
+    [LW_CHANNEL_STATUS] = {"STATUS", size_status, __leeway_status_t_get_hash, encode_status, decode_status},
+    [LW_CHANNEL_PLANT_STATUS] = {"PLANT_STATUS", size_status, __leeway_status_t_get_hash, encode_status, decode_status},
 };
 
 const char *lw_wire_channel_name(enum lw_channel channel)
@@ -360,7 +419,7 @@ enum lw_status lw_wire_decode(enum lw_channel channel, const void *data, uint32_
     // Size before decode: a packet without a channel name arrives with a size near 2^32.
     if (size != lw_wire_size(channel))
         return LW_E_SIZE;
-    return rows[channel].decode ? rows[channel].decode(data, (int)size, message) : LW_E_DECODE;
+    return rows[channel].decode(data, (int)size, message);
 }
 
 uint32_t lw_wire_encode(enum lw_channel channel, const union lw_message *message, void *data)

@@ -36,7 +36,7 @@ union lw_message {
     struct lw_joint_command joint_command;
     struct lw_obstacle_change obstacles; // OBSTACLES and WORLD
     struct lw_request request;           // GOAL and STOP
-    struct lw_report report;             // STATUS and PLANT_STATUS; only encoded here
+    struct lw_report report;             // STATUS and PLANT_STATUS
 };
 
 // Name of a channel without a robot's prefix.

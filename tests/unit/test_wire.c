@@ -12,6 +12,7 @@
 
 #include <leeway_joint_command_t.h> // the explanation, which lw_wire_decode leaves to logs
 #include <leeway_obstacles_t.h>     // constants
+#include <leeway_joint_state_t.h>   // constants
 #include <leeway_scene_t.h>         // fingerprint
 
 enum { PLACE_OF_OP = 8 + 4 * 8, PLACE_OF_MODE = PLACE_OF_OP }; // behind fingerprint and header
@@ -43,11 +44,11 @@ static void sizes_and_fingerprints_are_pinned(void **state)
         const char *name;
         uint32_t size;
         uint64_t fingerprint;
-    } pins[LW_CHANNEL_COUNT] = {{"JOINT_STATE", 169, UINT64_C(0x81b22a7757065507)},
-                                {"JOINT_COMMAND", 361, UINT64_C(0x8ce2302ea51cdd57)},
-                                {"OBSTACLES", 1197, UINT64_C(0x3cf45f88e3722515)},
-                                {"GOAL", 64, UINT64_C(0xe5b8f4c1200087cc)},
-                                {"STOP", 40, UINT64_C(0xf578849c63c10feb)}};
+    } pins[LW_CHANNEL_COUNT] = {
+        {"JOINT_STATE", 169, UINT64_C(0x81b22a7757065507)}, {"JOINT_COMMAND", 378, UINT64_C(0x196dfb26cc0a9b77)},
+        {"OBSTACLES", 1197, UINT64_C(0x3cf45f88e3722515)},  {"GOAL", 64, UINT64_C(0xe5b8f4c1200087cc)},
+        {"STOP", 40, UINT64_C(0xf578849c63c10feb)},         {"WORLD", 1197, UINT64_C(0x3cf45f88e3722515)},
+        {"STATUS", 381, UINT64_C(0xdd9967741e39c9dc)},      {"PLANT_STATUS", 381, UINT64_C(0xdd9967741e39c9dc)}};
     for (int c = 0; c < LW_CHANNEL_COUNT; c++) {
         const enum lw_channel channel = (enum lw_channel)c;
         assert_string_equal(lw_wire_channel_name(channel), pins[c].name);
@@ -62,6 +63,7 @@ static void sizes_and_fingerprints_are_pinned(void **state)
 static void constants_are_those_of_the_wire(void **state)
 {
     (void)state;
+    assert_int_equal(LW_NJ, LEEWAY_JOINT_COMMAND_T_NJ);
     assert_int_equal(LW_LIMIT_POSITION, LEEWAY_JOINT_COMMAND_T_LIMIT_POSITION);
     assert_int_equal(LW_LIMIT_VELOCITY, LEEWAY_JOINT_COMMAND_T_LIMIT_VELOCITY);
     assert_int_equal(LW_LIMIT_ACCELERATION, LEEWAY_JOINT_COMMAND_T_LIMIT_ACCELERATION);
@@ -69,14 +71,22 @@ static void constants_are_those_of_the_wire(void **state)
     assert_int_equal(LW_STALE, LEEWAY_JOINT_COMMAND_T_STALE);
     assert_int_equal(LW_NOT_FINITE, LEEWAY_JOINT_COMMAND_T_NOT_FINITE);
     assert_int_equal(LW_WAITING, LEEWAY_JOINT_COMMAND_T_WAITING);
+    assert_int_equal(LW_FOREIGN, LEEWAY_JOINT_COMMAND_T_FOREIGN);
+    assert_int_equal(LW_WARMING_UP, LEEWAY_JOINT_COMMAND_T_WARMING_UP);
     assert_int_equal(LW_COMMAND_IDLE, LEEWAY_JOINT_COMMAND_T_IDLE);
     assert_int_equal(LW_COMMAND_VELOCITY, LEEWAY_JOINT_COMMAND_T_VELOCITY);
+    assert_int_equal(LW_LAW_NOT_ASKED, LEEWAY_JOINT_COMMAND_T_NOT_ASKED);
+    assert_int_equal(LW_LAW_OK, LEEWAY_JOINT_COMMAND_T_OK);
+    assert_int_equal(LW_LAW_NO_NUMBER, LEEWAY_JOINT_COMMAND_T_NO_NUMBER);
+    assert_int_equal(LW_PLANT_HOLD, LEEWAY_JOINT_STATE_T_HOLD);
+    assert_int_equal(LW_PLANT_MOVING, LEEWAY_JOINT_STATE_T_MOVING);
+    assert_int_equal(LW_PLANT_STOPPING, LEEWAY_JOINT_STATE_T_STOPPING);
+    assert_int_equal(LW_PLANT_ENDED, LEEWAY_JOINT_STATE_T_ENDED);
     assert_int_equal(LW_UPSERT, LEEWAY_OBSTACLES_T_UPSERT);
     assert_int_equal(LW_REMOVE, LEEWAY_OBSTACLES_T_REMOVE);
     assert_int_equal(LW_REPLACE, LEEWAY_OBSTACLES_T_REPLACE);
     assert_int_equal(LW_CLEAR, LEEWAY_OBSTACLES_T_CLEAR);
     assert_int_equal(LW_CHANGE_MAX, LEEWAY_OBSTACLES_T_MAX);
-    assert_int_equal(LW_NJ, LEEWAY_JOINT_COMMAND_T_NJ);
 }
 
 // --- what is valid survives ---
@@ -157,7 +167,8 @@ static void the_explanation_of_a_command_reaches_the_log(void **state)
                                             .state_tick = 7,
                                             .state_mono_ns = 8,
                                             .mode = LW_COMMAND_VELOCITY,
-                                            .flags = 127,
+                                            .flags = 511,
+                                            .law_outcome = LW_LAW_NO_NUMBER,
                                             .qd = {1, 2, 3, 4, 5, 6},
                                             .qd_law = {7, 8, 9, 10, 11, 12},
                                             .q = {-1, -2, -3, -4, -5, -6},
@@ -171,21 +182,46 @@ static void the_explanation_of_a_command_reaches_the_log(void **state)
                                             .tick = 41,
                                             .tick_ns = 42,
                                             .state_age_ns = 43,
-                                            .wake_late_ns = 44,
-                                            .previous_exec_ns = 45,
-                                            .skipped = 46}};
+                                            .input_digest = 44,
+                                            .compute_ns = 45,
+                                            .wake_late_ns = 46,
+                                            .previous_exec_ns = 47,
+                                            .skipped = 48}};
     const struct lw_joint_command *c = &m.joint_command;
     unsigned char data[LW_WIRE_MAX];
     leeway_joint_command_t w;
     const int size = (int)lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &m, data);
     assert_int_equal(leeway_joint_command_t_decode(data, 0, size, &w), size);
     // In the order of the numbers above.
-    const int64_t counts[] = {w.h.utime,         w.h.mono_ns,      w.h.session,         w.h.seq,     w.plant_session,
-                              w.state_seq,       w.state_tick,     w.state_mono_ns,     w.mode,      w.flags,
-                              w.request_session, w.request_seq,    w.world_session,     w.world_seq, w.world_version,
-                              w.obstacle_count,  w.distance_point, w.distance_obstacle, w.tick,      w.tick_ns,
-                              w.state_age_ns,    w.wake_late_ns,   w.previous_exec_ns,  w.skipped};
-    const int64_t expected[] = {1, 2, 3, 4, 5, 6, 7, 8, 1, 127, 31, 32, 33, 34, 35, 36, 39, 40, 41, 42, 43, 44, 45, 46};
+    const int64_t counts[] = {w.h.utime,
+                              w.h.mono_ns,
+                              w.h.session,
+                              w.h.seq,
+                              w.plant_session,
+                              w.state_seq,
+                              w.state_tick,
+                              w.state_mono_ns,
+                              w.mode,
+                              w.flags,
+                              w.law_outcome,
+                              w.request_session,
+                              w.request_seq,
+                              w.world_session,
+                              w.world_seq,
+                              w.world_version,
+                              w.obstacle_count,
+                              w.distance_point,
+                              w.distance_obstacle,
+                              w.tick,
+                              w.tick_ns,
+                              w.state_age_ns,
+                              w.input_digest,
+                              w.compute_ns,
+                              w.wake_late_ns,
+                              w.previous_exec_ns,
+                              w.skipped};
+    const int64_t expected[] = {1,  2,  3,  4,  5,  6,  7,  8,  1,  511, 2,  31, 32, 33,
+                                34, 35, 36, 39, 40, 41, 42, 43, 44, 45,  46, 47, 48};
     assert_same_bits(counts, expected, sizeof expected);
     assert_same_bits(w.qd, c->qd, sizeof w.qd);
     assert_same_bits(w.qd_law, c->qd_law, sizeof w.qd_law);
@@ -283,6 +319,7 @@ static void every_double_is_checked(void **state)
         check_double(LW_CHANNEL_OBSTACLES, &o, &o.obstacles.obstacle[LW_CHANGE_MAX - 1].p[i], 100);
     }
     check_double(LW_CHANNEL_OBSTACLES, &o, &o.obstacles.obstacle[LW_CHANGE_MAX - 1].radius, 100);
+    check_double(LW_CHANNEL_WORLD, &o, &o.obstacles.obstacle[LW_CHANGE_MAX - 1].radius, 100);
     o.obstacles.obstacle[3].radius = -5e-324;
     check_message(LW_CHANNEL_OBSTACLES, &o, LW_E_ARGUMENT);
 }
@@ -295,14 +332,14 @@ static void every_choice_is_checked(void **state)
     const struct {
         enum lw_channel channel;
         int place, choices;
-    } fields[] = {{LW_CHANNEL_JOINT_STATE, PLACE_OF_MODE, 3},
-                  {LW_CHANNEL_JOINT_COMMAND, PLACE_OF_MODE + 32, 2},
-                  {LW_CHANNEL_OBSTACLES, PLACE_OF_OP, 4}};
+    } fields[] = {{LW_CHANNEL_JOINT_STATE, PLACE_OF_MODE, 4}, {LW_CHANNEL_JOINT_COMMAND, PLACE_OF_MODE + 32, 2},
+                  {LW_CHANNEL_OBSTACLES, PLACE_OF_OP, 4},     {LW_CHANNEL_WORLD, PLACE_OF_OP, 4},
+                  {LW_CHANNEL_STATUS, PLACE_OF_MODE, 5},      {LW_CHANNEL_PLANT_STATUS, PLACE_OF_MODE, 5}};
     for (size_t f = 0; f < sizeof fields / sizeof fields[0]; f++)
         for (int value = 0; value < 256; value++) {
             unsigned char data[LW_WIRE_MAX];
             union lw_message m = make(&random, fields[f].channel), out;
-            if (fields[f].channel == LW_CHANNEL_OBSTACLES)
+            if (fields[f].channel == LW_CHANNEL_OBSTACLES || fields[f].channel == LW_CHANNEL_WORLD)
                 m.obstacles.op = LW_UPSERT;
             const uint32_t size = lw_wire_encode(fields[f].channel, &m, data);
             data[fields[f].place] = (unsigned char)value;

@@ -154,6 +154,19 @@ static bool state_keeps_its_ranges(const struct lw_joint_state *s)
            s->period_ns > 0 && s->period_ns <= 1000000000 && s->tick >= 0;
 }
 
+static bool report_keeps_its_ranges(const struct lw_report *r)
+{
+    const int64_t counts[] = {r->ticks, r->skipped, r->stale_ticks, r->unsent,       r->peer_session,
+                              r->taken, r->missed,  r->takeovers,   r->minor_faults, r->major_faults};
+    bool ok = (unsigned)r->state <= LW_ENDING && r->period_ns > 0 && r->period_ns <= 1000000000;
+    ok = ok && r->allocations >= -1 && lw_all_finite(&r->distance, 1);
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
+        ok = ok && counts[i] >= 0;
+    for (int i = 0; i < LW_REFUSED_COUNT; i++)
+        ok = ok && r->refused[i] >= 0;
+    return ok;
+}
+
 // What every accepted message promises.
 static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
 {
@@ -166,9 +179,9 @@ static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
     case LW_CHANNEL_OBSTACLES:
     case LW_CHANNEL_WORLD: return stamped && obstacles_keep_their_ranges(&m->obstacles);
     case LW_CHANNEL_GOAL: return stamped && within(m->request.goal, 3, 100);
-    case LW_CHANNEL_STOP:
     case LW_CHANNEL_STATUS:
-    case LW_CHANNEL_PLANT_STATUS:
+    case LW_CHANNEL_PLANT_STATUS: return stamped && report_keeps_its_ranges(&m->report);
+    case LW_CHANNEL_STOP:
     case LW_CHANNEL_COUNT: break;
     }
     return stamped;

@@ -65,6 +65,33 @@ static inline void make_obstacles(struct random *random, struct lw_obstacle_chan
     }
 }
 
+static inline int64_t any_count(struct random *random)
+{
+    return any_int(random) & INT64_MAX;
+}
+
+static inline void make_report(struct random *random, struct lw_report *r)
+{
+    int64_t *const counts[] = {&r->ticks, &r->skipped, &r->stale_ticks, &r->unsent,       &r->peer_session,
+                               &r->taken, &r->missed,  &r->takeovers,   &r->minor_faults, &r->major_faults};
+    r->state = (enum lw_run_state)random_below(random, LW_ENDING + 1);
+    r->faults = (unsigned)random_below(random, 64);
+    r->faults_ever = r->faults | (unsigned)random_below(random, 64);
+    r->realtime = (unsigned)random_below(random, 16);
+    r->period_ns = 1 + random_below(random, 1000000000);
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
+        *counts[i] = any_count(random);
+    for (int i = 0; i < LW_REFUSED_COUNT; i++)
+        r->refused[i] = any_count(random);
+    for (int i = 0; i < LW_PERCENTILES; i++) {
+        r->wake_late_ns[i] = any_int(random);
+        r->exec_ns[i] = any_int(random);
+        r->age_ns[i] = any_int(random);
+    }
+    r->allocations = random_below(random, 2) ? -1 : any_count(random);
+    r->distance = extreme(random, 1e300);
+}
+
 // A valid message of a channel; all bytes that no field owns are zero.
 static inline union lw_message make(struct random *random, enum lw_channel channel)
 {
@@ -87,7 +114,7 @@ static inline union lw_message make(struct random *random, enum lw_channel chann
     case LW_CHANNEL_GOAL: fill(random, 100, m.request.goal, 3); break;
     case LW_CHANNEL_STOP: m.request.kind = LW_REQUEST_STOP; break;
     case LW_CHANNEL_STATUS:
-    case LW_CHANNEL_PLANT_STATUS:
+    case LW_CHANNEL_PLANT_STATUS: make_report(random, &m.report); break;
     case LW_CHANNEL_COUNT: break;
     }
     return m;
