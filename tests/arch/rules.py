@@ -154,7 +154,7 @@ BANNED = re.compile(
     """,
     re.X,
 )
-ARCHIVES = ("base", "arm", "collision", "tick", "plant")
+ARCHIVES = ("base", "arm", "collision", "gate", "tick", "plant")
 
 
 def plain_symbol(symbol: str) -> str:

@@ -154,6 +154,11 @@ static bool state_keeps_its_ranges(const struct lw_joint_state *s)
            s->period_ns > 0 && s->period_ns <= 1000000000 && s->tick >= 0;
 }
 
+static bool command_keeps_its_ranges(const struct lw_joint_command *c)
+{
+    return c->state_tick >= 0 && within(c->qd, LW_NJ, 1e6) && (unsigned)c->mode <= LW_COMMAND_VELOCITY;
+}
+
 static bool report_keeps_its_ranges(const struct lw_report *r)
 {
     const int64_t counts[] = {r->ticks, r->skipped, r->stale_ticks, r->unsent,       r->peer_session,
@@ -167,24 +172,26 @@ static bool report_keeps_its_ranges(const struct lw_report *r)
     return ok;
 }
 
-// What every accepted message promises.
-static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
+static bool values_keep_their_ranges(enum lw_channel channel, const union lw_message *m)
 {
-    const bool stamped = m->stamp.session > 0 && m->stamp.seq > 0;
-    const struct lw_joint_command *c = &m->joint_command;
     switch (channel) {
-    case LW_CHANNEL_JOINT_STATE: return stamped && state_keeps_its_ranges(&m->joint_state);
-    case LW_CHANNEL_JOINT_COMMAND:
-        return stamped && c->state_tick >= 0 && within(c->qd, LW_NJ, 1e6) && (unsigned)c->mode <= LW_COMMAND_VELOCITY;
+    case LW_CHANNEL_JOINT_STATE: return state_keeps_its_ranges(&m->joint_state);
+    case LW_CHANNEL_JOINT_COMMAND: return command_keeps_its_ranges(&m->joint_command);
     case LW_CHANNEL_OBSTACLES:
-    case LW_CHANNEL_WORLD: return stamped && obstacles_keep_their_ranges(&m->obstacles);
-    case LW_CHANNEL_GOAL: return stamped && within(m->request.goal, 3, 100);
+    case LW_CHANNEL_WORLD: return obstacles_keep_their_ranges(&m->obstacles);
+    case LW_CHANNEL_GOAL: return within(m->request.goal, 3, 100);
     case LW_CHANNEL_STATUS:
-    case LW_CHANNEL_PLANT_STATUS: return stamped && report_keeps_its_ranges(&m->report);
+    case LW_CHANNEL_PLANT_STATUS: return report_keeps_its_ranges(&m->report);
     case LW_CHANNEL_STOP:
     case LW_CHANNEL_COUNT: break;
     }
-    return stamped;
+    return true;
+}
+
+// What every accepted message promises.
+static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
+{
+    return m->stamp.session > 0 && m->stamp.seq > 0 && values_keep_their_ranges(channel, m);
 }
 
 static void fill_random(struct random *random, unsigned char *data, uint32_t size)
