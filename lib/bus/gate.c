@@ -8,7 +8,13 @@
 // Errors   see gate.h.
 #include "bus/gate.h"
 
-#include <math.h> // fabs
+#include <math.h> // fabs, isfinite
+
+// Sum that ends at the largest number: a hostile sender may skip as many numbers as it likes.
+static int64_t add(int64_t sum, int64_t more)
+{
+    return more > INT64_MAX - sum ? INT64_MAX : sum + more;
+}
 
 enum lw_verdict lw_lease_take(struct lw_lease *lease, const struct lw_stamp *stamp, int64_t now_ns, int64_t lease_ns)
 {
@@ -16,7 +22,7 @@ enum lw_verdict lw_lease_take(struct lw_lease *lease, const struct lw_stamp *sta
     if (stamp->session == lease->session) {
         if (stamp->seq <= lease->seq)
             return stamp->seq == lease->seq ? LW_REFUSED_DUPLICATE : LW_REFUSED_BACKWARDS;
-        lease->missed += stamp->seq - lease->seq - 1;
+        lease->missed = add(lease->missed, stamp->seq - lease->seq - 1);
     } else {
         if (held && now_ns - lease->last_ns < lease_ns)
             return LW_REFUSED_FOREIGN;
@@ -32,7 +38,7 @@ enum lw_verdict lw_lease_take(struct lw_lease *lease, const struct lw_stamp *sta
 static bool in_range(const double limit[LW_NJ], const double qd[LW_NJ])
 {
     for (int j = 0; j < LW_NJ; j++)
-        if (!(fabs(qd[j]) <= limit[j])) // also refuses what is no number
+        if (!isfinite(qd[j]) || fabs(qd[j]) > limit[j])
             return false;
     return true;
 }
@@ -48,8 +54,9 @@ enum lw_verdict lw_gate_judge(const struct lw_gate *gate, struct lw_lease *lease
         return LW_REFUSED_OTHER_PLANT;
     if (command->mode != LW_COMMAND_VELOCITY)
         return LW_REFUSED_IDLE;
-    // Before the lease: a late message of a dead controller must not seize a free one.
-    if (command->state_seq > state_seq || state_seq - command->state_seq > gate->max_lag)
+    // Before the lease: a late message of a dead controller must not seize a free one. The sender chooses its number,
+    // so it is only compared: a difference may not fit.
+    if (command->state_seq > state_seq || command->state_seq < state_seq - gate->max_lag)
         return LW_REFUSED_STALE;
     return lw_lease_take(lease, &command->stamp, now_ns, gate->lease_ns);
 }
