@@ -88,11 +88,11 @@ static int run_threads(struct lw_live *live)
 
 static bool open_all(struct lw_live *live)
 {
-    struct lw_bus **const bus[] = {&live->rt_bus, &live->rx_bus, &live->world_bus, &live->status_bus};
+    struct lw_bus **const bus[] = {&live->rt_bus, &live->world_bus, &live->status_bus};
     for (size_t i = 0; i < sizeof bus / sizeof bus[0]; i++)
         if (lw_program_open(live->control->program, bus[i]) != LW_OK)
             return false;
-    return lw_live_subscribe(live) == LW_OK;
+    return lw_program_open_stream(live->control->program, &live->rx_bus) == LW_OK && lw_live_subscribe(live) == LW_OK;
 }
 
 int lw_control_live(struct lw_control *control)

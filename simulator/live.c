@@ -272,7 +272,8 @@ int lw_simulation_live(struct lw_simulation *simulation)
     int status = EXIT_FAILURE;
     if (!lw_health_init(&live.health, simulation->plant.period_ns))
         lw_program_fail(program, "out of memory");
-    else if (lw_program_open(program, &live.rt_bus) == LW_OK && lw_program_open(program, &live.rx_bus) == LW_OK &&
+    else if (lw_program_open(program, &live.rt_bus) == LW_OK &&
+             lw_program_open_stream(program, &live.rx_bus) == LW_OK &&
              lw_program_open(program, &live.main_bus) == LW_OK && subscribe(&live) == LW_OK)
         status = run_threads(&live);
     lw_health_free(&live.health);

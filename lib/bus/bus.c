@@ -20,7 +20,7 @@
 #include <sys/socket.h> // socket, connect
 #include <unistd.h>     // close
 
-enum { QUEUE_CAPACITY = 64 };
+enum { QUEUE_CAPACITY = 64, RECEIVE_BYTES = 2097152 };
 
 static const char default_url[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
@@ -57,16 +57,15 @@ static bool has_route(const struct sockaddr_in *address)
     return ok;
 }
 
-static enum lw_status check_url(const char *url, struct lw_error *error)
+static enum lw_status check_url(const char *url, struct sockaddr_in *address, struct lw_error *error)
 {
-    struct sockaddr_in address;
-    if (!parse_url(url, &address)) {
+    if (!parse_url(url, address)) {
         snprintf(error->text, sizeof error->text,
                  "LCM URL: expected udpm://GROUP:PORT?ttl=N with a multicast group, as in %s, found \"%.100s\"",
                  default_url, url);
         return LW_E_BUS;
     }
-    if (!has_route(&address)) {
+    if (!has_route(address)) {
         snprintf(error->text, sizeof error->text,
                  "no multicast route for %.60s (%s); for this host alone: "
                  "sudo ip link set lo multicast on && sudo ip route add 224.0.0.0/4 dev lo",
@@ -91,17 +90,19 @@ enum lw_status lw_bus_open(const struct lw_bus_config *config, struct lw_bus **o
 {
     const char *from_environment = getenv("LCM_DEFAULT_URL"); // NOLINT(concurrency-mt-unsafe): nobody sets it
     const char *url = config->url ? config->url : from_environment ? from_environment : default_url;
-    enum lw_status status = check_url(url, error);
+    struct sockaddr_in group;
+    const enum lw_status status = check_url(url, &group, error);
     if (status != LW_OK)
         return status;
     struct lw_bus *bus = calloc(1, sizeof *bus);
-    if (bus != NULL)
+    if (bus != NULL && !config->own_socket)
         bus->lcm = lcm_create(url);
-    if (bus == NULL || bus->lcm == NULL) {
+    if (bus == NULL || (bus->lcm == NULL && !config->own_socket)) {
         snprintf(error->text, sizeof error->text, "LCM cannot open %.200s", url);
         free(bus);
         return LW_E_BUS;
     }
+    bus->group = group;
     bus->session = config->session;
     bus->refusals = config->refusals;
     name_channels(bus, config->name);
@@ -116,21 +117,27 @@ void lw_bus_close(struct lw_bus *bus)
 {
     if (bus == NULL)
         return;
-    lcm_destroy(bus->lcm);
+    if (bus->lcm != NULL)
+        lcm_destroy(bus->lcm);
+    lw_datagram_close(&bus->datagram);
     free(bus);
 }
 
 // --- receive ---
 
+static void deliver(const struct lw_subscription *s, const void *data, uint32_t size)
+{
+    union lw_message message;
+    const enum lw_status status = lw_wire_decode(s->channel, data, size, &message);
+    if (lw_refusals_note(s->bus->refusals, lw_verdict_of(status)))
+        s->handler(s->user, s->channel, &message);
+}
+
 // Own raw handler: LCM's generated one prints a line for every malformed message and counts nothing.
 static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *user)
 {
     (void)channel;
-    struct lw_subscription *s = user;
-    union lw_message message;
-    const enum lw_status status = lw_wire_decode(s->channel, buf->data, buf->data_size, &message);
-    if (lw_refusals_note(s->bus->refusals, lw_verdict_of(status)))
-        s->handler(s->user, s->channel, &message);
+    deliver(user, buf->data, buf->data_size);
 }
 
 enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler, void *user,
@@ -138,6 +145,8 @@ enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_
 {
     struct lw_subscription *s = &bus->subscription[channel];
     *s = (struct lw_subscription){.bus = bus, .channel = channel, .handler = handler, .user = user};
+    if (bus->lcm == NULL)
+        return lw_datagram_open(&bus->datagram, &bus->group, bus->channel_name[channel], RECEIVE_BYTES, error);
     lcm_subscription_t *made = lcm_subscribe(bus->lcm, bus->channel_name[channel], handle_raw, s);
     if (made == NULL) {
         snprintf(error->text, sizeof error->text,
@@ -150,8 +159,22 @@ enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_
     return LW_OK;
 }
 
+// One message at most: the socket itself is the queue.
+static bool handle_datagram(struct lw_bus *bus, int timeout_ms)
+{
+    const void *data = NULL;
+    uint32_t size = 0;
+    const int got = lw_datagram_receive(&bus->datagram, timeout_ms, &data, &size);
+    for (int c = 0; got > 0 && c < LW_CHANNEL_COUNT; c++)
+        if (bus->subscription[c].handler != NULL)
+            deliver(&bus->subscription[c], data, size);
+    return got >= 0;
+}
+
 bool lw_bus_handle(struct lw_bus *bus, int timeout_ms)
 {
+    if (bus->lcm == NULL)
+        return handle_datagram(bus, timeout_ms);
     int handled = lcm_handle_timeout(bus->lcm, timeout_ms);
     while (handled > 0)
         handled = lcm_handle_timeout(bus->lcm, 0);

@@ -27,6 +27,8 @@ struct lw_bus_config {
     const char *name; // robot's prefix of the channels JOINT_STATE, JOINT_COMMAND, GOAL, STOP, SCENE; NULL = none
     int64_t session;  // from lw_clock_session, one per process
     struct lw_refusals *refusals; // counts what handlers never see
+    bool own_socket; // receives one channel by bus/datagram.h in the handling thread, without LCM's threads, and
+                     // cannot publish
 };
 
 typedef void (*lw_bus_handler)(void *user, enum lw_channel channel, const union lw_message *message);
@@ -37,7 +39,8 @@ LW_MUST_CHECK enum lw_status lw_bus_open(const struct lw_bus_config *config, str
 void lw_bus_close(struct lw_bus *bus);
 
 // Calls handler(user, ...) from lw_bus_handle for every valid message of a channel. The first call of a bus starts
-// LCM's read thread, which inherits the caller's scheduling. Fails LW_E_BUS when the bus does not hear itself.
+// LCM's read thread, which inherits the caller's scheduling. Fails LW_E_BUS when the bus does not hear itself. With
+// own_socket there is no such thread, and only one channel.
 LW_MUST_CHECK enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler,
                                               void *user, struct lw_error *error);
 

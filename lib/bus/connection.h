@@ -10,6 +10,7 @@
 #define LW_BUS_CONNECTION_H
 
 #include "bus/bus.h"
+#include "bus/datagram.h" // struct lw_datagram
 
 #include <lcm/lcm.h> // lcm_t
 #include <leeway_scene_t.h>
@@ -24,7 +25,9 @@ struct lw_subscription {
 };
 
 struct lw_bus {
-    lcm_t *lcm;
+    lcm_t *lcm; // NULL with own_socket
+    struct sockaddr_in group;
+    struct lw_datagram datagram; // with own_socket
     int64_t session;
     char name[LW_NAME_MAX + 2]; // prefix of channels, with its underscore
     char channel_name[LW_CHANNEL_COUNT][LW_CHANNEL_NAME_MAX];

@@ -27,7 +27,8 @@ enum {
     KEY_CPU,
     KEY_PRIORITY,
     KEY_HISTOGRAM,
-    KEY_POSTMORTEM
+    KEY_POSTMORTEM,
+    KEY_TRANSPORT
 };
 
 const char *argp_program_version = LW_BUILD;
@@ -58,6 +59,9 @@ static const struct argp_option common_options[] = {
      0},
     {"cpu", KEY_CPU, "N", 0, "Bind the real-time thread to this CPU.", 0},
     {"priority", KEY_PRIORITY, "P", 0, "SCHED_FIFO priority of the real-time thread, 2 to 98 (80).", 0},
+    {"transport", KEY_TRANSPORT, "HOW", 0,
+     "Receive the other side's stream by a socket of its own in the receiving thread (own), or by LCM's threads (lcm).",
+     0},
     {"histogram", KEY_HISTOGRAM, "FILE", 0, "At the end, write the loop's timing as JSON, in bins of 1 us.", 0},
     {"quiet", 'q', NULL, 0, "Errors only.", 0},
     {"help-scene", KEY_HELP_SCENE, NULL, 0, "List every key that a scene may have.", 0},
@@ -85,24 +89,32 @@ static int parse_number(const char *option, const char *text, int min, int max, 
     return (int)number;
 }
 
-static void parse_realtime(struct lw_program *program, const char *text, struct argp_state *state)
+// One of the words of a list that ends with NULL, as its place there.
+static int parse_choice(const char *option, const char *text, const char *const *words, struct argp_state *state)
 {
-    static const char *const wish[] = {
-        [LW_REALTIME_AUTO] = "auto", [LW_REALTIME_REQUIRE] = "require", [LW_REALTIME_OFF] = "off"};
+    char expected[100] = "";
     int found = 0;
-    while (found <= LW_REALTIME_OFF && strcmp(wish[found], text) != 0)
-        found++;
-    if (found > LW_REALTIME_OFF)
-        argp_error(state, "--rt: expected auto, require or off, found \"%s\"", text);
-    program->realtime_wish = (enum lw_realtime_wish)found;
+    for (; words[found] != NULL && strcmp(words[found], text) != 0; found++)
+        snprintf(expected + strlen(expected), sizeof expected - strlen(expected), "%s%s", found ? ", " : "",
+                 words[found]);
+    if (words[found] == NULL)
+        argp_error(state, "--%s: expected one of %s, found \"%s\"", option, expected, text);
+    return found;
 }
+
+static const char *const realtime_wishes[] = {
+    [LW_REALTIME_AUTO] = "auto", [LW_REALTIME_REQUIRE] = "require", [LW_REALTIME_OFF] = "off", NULL};
+static const char *const transports[] = {"own", "lcm", NULL};
 
 // Options about keeping time.
 static error_t parse_realtime_option(int key, char *arg, struct argp_state *state)
 {
     struct lw_program *program = state->input;
     switch (key) {
-    case KEY_REALTIME: parse_realtime(program, arg, state); break;
+    case KEY_REALTIME:
+        program->realtime_wish = (enum lw_realtime_wish)parse_choice("rt", arg, realtime_wishes, state);
+        break;
+    case KEY_TRANSPORT: program->lcm_threads = parse_choice("transport", arg, transports, state) == 1; break;
     case KEY_CPU: program->cpu = parse_number("cpu", arg, 0, CPU_SETSIZE - 1, state); break;
     case KEY_PRIORITY: program->priority = parse_number("priority", arg, PRIORITY_MIN, PRIORITY_MAX, state); break;
     case KEY_POSTMORTEM: program->postmortem = strcmp(arg, "none") == 0 ? NULL : arg; break;

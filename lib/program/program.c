@@ -47,13 +47,25 @@ void lw_program_fail(const struct lw_program *program, const char *format, ...)
 
 // --- bus ---
 
-enum lw_status lw_program_open(const struct lw_program *program, struct lw_bus **bus)
+static enum lw_status open_bus(const struct lw_program *program, bool own_socket, struct lw_bus **bus)
 {
     struct lw_error error;
-    const enum lw_status status = lw_bus_open(&program->bus_config, bus, &error);
+    struct lw_bus_config config = program->bus_config;
+    config.own_socket = own_socket;
+    const enum lw_status status = lw_bus_open(&config, bus, &error);
     if (status != LW_OK)
         lw_program_fail(program, "%s", error.text);
     return status;
+}
+
+enum lw_status lw_program_open(const struct lw_program *program, struct lw_bus **bus)
+{
+    return open_bus(program, false, bus);
+}
+
+enum lw_status lw_program_open_stream(const struct lw_program *program, struct lw_bus **bus)
+{
+    return open_bus(program, !program->lcm_threads, bus);
 }
 
 enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_bus *bus, enum lw_channel channel,

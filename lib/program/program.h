@@ -38,6 +38,7 @@ struct lw_program {
     enum lw_realtime_wish realtime_wish;
     int cpu;                // that the real-time thread is bound to, -1 = any
     int priority;           // SCHED_FIFO of the real-time thread; its receive thread has one less
+    bool lcm_threads;       // receive the peer's stream by LCM's own threads
     const char *postmortem; // folder of the files written after a fault, NULL = none
     const char *histogram;  // file for statistics at the end, NULL = none
     struct lw_bus_config bus_config;
@@ -57,8 +58,9 @@ void lw_program_start(struct lw_program *program, int argc, char **argv);
 void lw_program_say(const struct lw_program *program, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void lw_program_fail(const struct lw_program *program, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-// Opens a bus connection, or subscribes on one; says why not.
+// Opens a bus connection, one for the peer's real-time stream alone, or subscribes on one; says why not.
 LW_MUST_CHECK enum lw_status lw_program_open(const struct lw_program *program, struct lw_bus **bus);
+LW_MUST_CHECK enum lw_status lw_program_open_stream(const struct lw_program *program, struct lw_bus **bus);
 LW_MUST_CHECK enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_bus *bus,
                                                   enum lw_channel channel, lw_bus_handler handler, void *user);
 

@@ -191,7 +191,7 @@ def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> 
     args += [f"--name={config.name}"] if config.name else []
     pace = f"--pace={config.pace}"
     children.append(Child("leeway-simulator", "--until-done", pace, *args))
-    children.append(Child("leeway-controller", *args))
+    children.append(Child("leeway-controller", f"--post-mortem={config.log.parent}", *args))
 
 
 def _stop(config: RunConfig, bus: lcm.LCM, children: list[Child]) -> None:
@@ -242,7 +242,7 @@ def _watch(
     watch = _Watch(bus, config.name)
     simulator = children[1]
     started = time.monotonic()
-    # The controller listens to the plant for 16 periods before it starts.
+    # Programs warm up for half a second, and the controller listens to the plant for a few periods.
     patience = START_PATIENCE_S + 20 / float(config.scene.to_dict()["rate_hz"])
     moved: float | None = None
     while simulator.status() is None:
