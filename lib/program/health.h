@@ -62,7 +62,7 @@ struct lw_health {
 
 enum { LW_HEALTH_PAST_S = 2 };
 
-// False when there is no memory.
+// False when there is no memory; lw_health_free is due in both cases.
 bool lw_health_init(struct lw_health *health, int64_t period_ns);
 void lw_health_free(struct lw_health *health);
 

@@ -34,8 +34,8 @@ static unsigned ask(const struct lw_program *program)
 {
     unsigned granted = 0;
     // Memory given back stays mapped, so that it need not be faulted in again.
-    (void)mallopt(M_TRIM_THRESHOLD, -1);
-    (void)mallopt(M_MMAP_MAX, 0);
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread has started yet
+    (void)(mallopt(M_TRIM_THRESHOLD, -1) && mallopt(M_MMAP_MAX, 0));
     if (lw_thread_lock_memory())
         granted |= LW_RT_LOCKED;
     if (keep_awake())

@@ -27,8 +27,8 @@ struct lw_link {
     bool (*receive)(int64_t *number);
 };
 
-// UDP multicast and nothing else, and LCM as the programs use it.
-extern const struct lw_link lw_link_udp, lw_link_lcm;
+// UDP multicast and nothing else; LCM's wire received by LCM's threads, or by a socket of its own.
+extern const struct lw_link lw_link_udp, lw_link_lcm, lw_link_own;
 
 // Bytes of a datagram, there (ping's) or back.
 size_t lw_link_bytes(bool from_ping);

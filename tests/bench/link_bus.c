@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// lib/bus as the programs use it: one connection that only sends, one that only hears, LCM's threads one below the
-// real-time thread.
+// lib/bus as the programs use it: one connection that only sends, one that only hears, either by LCM's threads one
+// below the real-time thread or by a socket of its own.
 //
 // Units    none.
 // Frames   none.
@@ -41,14 +41,18 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
     end.fresh = true;
 }
 
-// Opens both connections; the thread that subscribes hands its priority to LCM's.
-static bool open_bus(const struct lw_bus_config *config, bool is_ping)
+// Opens both connections; the thread that subscribes hands its priority to LCM's, where there are any.
+static bool open_bus(bool is_ping, bool own_socket)
 {
+    static struct lw_refusals refusals;
     struct lw_error error;
+    const struct lw_bus_config out = {.session = lw_clock_session(), .refusals = &refusals};
+    struct lw_bus_config in = out;
+    in.own_socket = own_socket;
     const enum lw_channel hears = is_ping ? LW_CHANNEL_JOINT_COMMAND : LW_CHANNEL_JOINT_STATE;
     end.sends = is_ping ? LW_CHANNEL_JOINT_STATE : LW_CHANNEL_JOINT_COMMAND;
     (void)lw_thread_set_priority(RX_PRIORITY); // the ping-pong says itself when the system refuses
-    if (lw_bus_open(config, &end.out, &error) == LW_OK && lw_bus_open(config, &end.in, &error) == LW_OK &&
+    if (lw_bus_open(&out, &end.out, &error) == LW_OK && lw_bus_open(&in, &end.in, &error) == LW_OK &&
         lw_bus_subscribe(end.in, hears, on_message, NULL, &error) == LW_OK)
         return true;
     fprintf(stderr, "pingpong: %s\n", error.text);
@@ -57,9 +61,12 @@ static bool open_bus(const struct lw_bus_config *config, bool is_ping)
 
 static bool open_lcm(bool is_ping)
 {
-    static struct lw_refusals refusals;
-    const struct lw_bus_config config = {.session = lw_clock_session(), .refusals = &refusals};
-    return open_bus(&config, is_ping);
+    return open_bus(is_ping, false);
+}
+
+static bool open_own(bool is_ping)
+{
+    return open_bus(is_ping, true);
 }
 
 static bool send_bus(int64_t number)
@@ -81,5 +88,5 @@ static bool receive_bus(int64_t *number)
     return true;
 }
 
-// Another transport of lib/bus is another row here: the same three functions, its own config in open.
 const struct lw_link lw_link_lcm = {"lcm", open_lcm, send_bus, receive_bus};
+const struct lw_link lw_link_own = {"own", open_own, send_bus, receive_bus};

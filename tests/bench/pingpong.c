@@ -153,7 +153,7 @@ static void answer(const struct lw_link *link, pid_t parent)
 
 static const struct lw_link *find_link(const char *name)
 {
-    static const struct lw_link *const links[] = {&lw_link_udp, &lw_link_lcm};
+    static const struct lw_link *const links[] = {&lw_link_udp, &lw_link_lcm, &lw_link_own};
     for (size_t i = 0; i < sizeof links / sizeof links[0]; i++)
         if (strcmp(links[i]->name, name) == 0)
             return links[i];
@@ -165,7 +165,7 @@ int main(int argc, char **argv)
     const struct lw_link *link = argc == 4 ? find_link(argv[1]) : NULL;
     const double rate_hz = argc == 4 ? strtod(argv[2], NULL) : 0, seconds = argc == 4 ? strtod(argv[3], NULL) : 0;
     if (link == NULL || !(rate_hz >= 1 && rate_hz <= 1e5) || !(seconds > 0 && seconds <= 1e4)) {
-        fprintf(stderr, "usage: pingpong udp|lcm RATE_HZ SECONDS\n");
+        fprintf(stderr, "usage: pingpong udp|lcm|own RATE_HZ SECONDS\n");
         return 2;
     }
     const pid_t self = getpid();

@@ -24,7 +24,7 @@ LCM_PORT = 7667
 PROGRAMS = {"controller": "leeway-controller", "plant": "leeway-simulator"}
 HISTOGRAMS = ("wake_late_us", "exec_us", "age_us")
 # Of the ping-pong; the first is what the others are compared to.
-LINKS = ("udp", "lcm")
+LINKS = ("udp", "lcm", "own")
 # Case C1: with its constant attraction the arm never comes to rest.
 SCENE = "c1"
 
