@@ -87,15 +87,13 @@ def round_trip_table(conditions: list[Condition]) -> Table:
     for link in LINKS[1:]:
         columns += [(f"{link} {p}", _ratio("round_trip", link, p)) for p in ROUND_TRIP_PERCENTILES]
         columns.append((f"{link} p99 us", _pair("round_trip_us", link, LINKS[0])))
-    return _table(conditions, *columns, *((f"{link} lost", _lost(link)) for link in LINKS))
+    return _table(conditions, *columns, (f"lost {'+'.join(LINKS)}", _lost))
 
 
-def _lost(link: str) -> Cell:
-    def cell(condition: Condition) -> str:
-        trips = condition["round_trips"][link]
-        return f"{trips['lost']} of {trips['sent']}"
-
-    return cell
+def _lost(condition: Condition) -> str:
+    trips = [condition["round_trips"][link] for link in LINKS]
+    lost = " + ".join(str(trip["lost"]) for trip in trips)
+    return f"{lost} of {min(trip['sent'] for trip in trips)}"
 
 
 def _both(name: str) -> Cell:
