@@ -7,13 +7,17 @@
 // Arrays   none.
 // Memory   counted.
 // Errors   cmocka's. Sanitizers bring allocators of their own: there the program ends with 77, skipped.
+#include "bus/datagram.h"
 #include "controller/tick.h"
+#include "datagram_packets.h" // make_packet
 #include "helpers.h"
 #include "simulator/plant.h"
 #include "wire_messages.h" // make
 
-#include <errno.h>     // ENOMEM
-#include <stdatomic.h> // atomic_llong
+#include <errno.h>      // ENOMEM
+#include <stdatomic.h>  // atomic_llong
+#include <sys/socket.h> // socketpair
+#include <unistd.h>     // close
 
 #ifdef __has_feature
 #define HAS(feature) __has_feature(feature)
@@ -196,12 +200,38 @@ static void every_channel_allocates_nothing(void **state)
     assert_true(taken > 1000 && refused > 1000 && world.version > 10);
 }
 
+// Receiving: messages, foreign packets, waits of several lengths that end with nothing.
+static void reception_allocates_nothing(void **state)
+{
+    (void)state;
+    struct random random = {102};
+    int pair[2];
+    assert_int_equal(socketpair(AF_UNIX, SOCK_DGRAM, 0, pair), 0);
+    static struct lw_datagram d;
+    d = (struct lw_datagram){.channel = "GOAL", .fd = pair[1], .timeout_ms = -1};
+    int heard = 0, nothing = 0;
+    const long long before = atomic_load(&calls);
+    for (int n = 0; n < 10000; n++) {
+        const void *payload = NULL;
+        uint32_t size = 0;
+        const struct packet p = make_packet(&random, n % 3 == 0 ? "GOALS" : "GOAL", 200);
+        if (n % 1000 != 0 && send(pair[0], p.bytes, p.size, 0) < 0)
+            break;
+        *(lw_datagram_receive(&d, n % 4, &payload, &size) == 1 ? &heard : &nothing) += 1;
+    }
+    assert_int_equal(atomic_load(&calls), before);
+    assert_true(heard > 6000 && nothing > 3000 && d.refused > 3000);
+    lw_datagram_close(&d);
+    close(pair[0]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_count_sees_every_call),
         cmocka_unit_test(tick_plant_and_wire_allocate_nothing),
         cmocka_unit_test(every_channel_allocates_nothing),
+        cmocka_unit_test(reception_allocates_nothing),
     };
     return cmocka_run_group_tests_name("no_allocation", tests, NULL, NULL);
 }
