@@ -92,7 +92,9 @@ void *lw_live_realtime(void *user)
         if (loop.record.fresh)
             loop.periodic.deadline_ns += lw_phase_correct(&loop.phase, loop.periodic.deadline_ns, arrival->arrival_ns,
                                                           arrival->joint.period_ns, idle);
-        const bool rest = lw_controller_at_rest(&live->control->state);
+        // An arm that another controller moves is not ours to bring to rest.
+        const bool foreign = (loop.message.joint_command.flags & LW_FOREIGN) != 0;
+        const bool rest = foreign || lw_controller_at_rest(&live->control->state);
         ended = atomic_load(&live->stopping) && (rest || !loop.record.sent);
         ended |= atomic_load(&live->abandoned);
     }
