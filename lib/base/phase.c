@@ -8,7 +8,8 @@
 // Errors   none.
 #include "base/phase.h"
 
-enum { GAIN_DIVISOR = 50, CLAMP_DIVISOR = 100 };
+// An error is half a period at most, so a correction is 1 % of a period at most.
+enum { GAIN_DIVISOR = 50 };
 
 // Remainder within half a period either way.
 static int64_t wrap(int64_t value, int64_t period)
@@ -42,6 +43,5 @@ int64_t lw_phase_correct(struct lw_phase *phase, int64_t deadline_ns, int64_t ar
         phase->count = 0; // these errors are of the deadlines before the jump
         return error > 0 ? period_ns - error : -error;
     }
-    const int64_t most = period_ns / CLAMP_DIVISOR, wanted = -error / GAIN_DIVISOR;
-    return wanted > most ? most : wanted < -most ? -most : wanted;
+    return -error / GAIN_DIVISOR;
 }
