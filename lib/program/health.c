@@ -89,7 +89,7 @@ static void count_in(struct lw_histogram *histogram, int64_t value_ns)
     histogram->max_ns = value_ns > histogram->max_ns ? value_ns : histogram->max_ns;
 }
 
-// Adds one tick to the totals. The first warm one only sets the marks.
+// Adds one tick to the totals. Those of the warm-up only set the mark.
 static void add(struct lw_health *health, const struct lw_record *record)
 {
     if (!record->warm) {
@@ -129,14 +129,19 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Percentiles of one field of the last n records; `offset` says which.
+// Percentiles of one field of the last n records, without the warm-up; `offset` says which. An age is one only while
+// the other side is expected.
 static void percentiles(const struct lw_health *health, int n, size_t offset, int64_t out[LW_PERCENTILES])
 {
-    for (int i = 0; i < n; i++)
-        health->sorted[i] = *(const int64_t *)((const unsigned char *)lw_health_past(health, i) + offset);
-    qsort(health->sorted, (size_t)n, sizeof health->sorted[0], ascending);
+    int used = 0;
+    for (int i = 0; i < n; i++) {
+        const struct lw_record *record = lw_health_past(health, i);
+        if (record->warm && (record->expected || offset != offsetof(struct lw_record, age_ns)))
+            health->sorted[used++] = *(const int64_t *)((const unsigned char *)record + offset);
+    }
+    qsort(health->sorted, (size_t)used, sizeof health->sorted[0], ascending);
     for (int p = 0; p < LW_PERCENTILES; p++)
-        out[p] = n > 0 ? health->sorted[(int)((n - 1) * percentile[p])] : 0;
+        out[p] = used > 0 ? health->sorted[(int)((used - 1) * percentile[p])] : 0;
 }
 
 // Faults that the last n records show.
@@ -156,21 +161,25 @@ static unsigned find_faults(const struct lw_health *health, int n)
     return faults;
 }
 
-// Faults that show in counters raised since the report before.
-static unsigned find_new_counts(struct lw_health *health, const struct lw_refusals *refusals)
+// A fault shows for a second after its counter grew.
+static unsigned watch(struct lw_counter *counter, int64_t value, int64_t now_ns, unsigned fault)
+{
+    if (value > counter->before)
+        counter->until_ns = now_ns + LW_NS_PER_S;
+    counter->before = value;
+    return now_ns < counter->until_ns ? fault : 0;
+}
+
+// Faults that show in counters.
+static unsigned find_counted(struct lw_health *health, const struct lw_refusals *refusals, int64_t now_ns)
 {
     int64_t bad = 0;
-    const int64_t foreign = lw_refusals_of(refusals, LW_REFUSED_FOREIGN);
     for (int reason = LW_REFUSED_SIZE; reason <= LW_REFUSED_RANGE; reason++)
         bad += lw_refusals_of(refusals, (enum lw_verdict)reason);
     const int64_t lost = (int64_t)atomic_load_explicit(&health->ring.lost, memory_order_relaxed);
-    const unsigned faults = (bad > health->bad_before ? LW_FAULT_BAD_INPUT : 0u) |
-                            (foreign > health->foreign_before ? LW_FAULT_LEASE : 0u) |
-                            (lost > health->lost_before ? LW_FAULT_LOST_RECORDS : 0u);
-    health->bad_before = bad;
-    health->foreign_before = foreign;
-    health->lost_before = lost;
-    return faults;
+    return watch(&health->bad, bad, now_ns, LW_FAULT_BAD_INPUT) |
+           watch(&health->foreign, lw_refusals_of(refusals, LW_REFUSED_FOREIGN), now_ns, LW_FAULT_LEASE) |
+           watch(&health->lost, lost, now_ns, LW_FAULT_LOST_RECORDS);
 }
 
 void lw_health_report(struct lw_health *health, const struct lw_refusals *refusals, struct lw_report *report)
@@ -197,7 +206,8 @@ void lw_health_report(struct lw_health *health, const struct lw_refusals *refusa
     report->minor_faults = atomic_load_explicit(&health->minor_faults, memory_order_relaxed);
     report->major_faults = atomic_load_explicit(&health->major_faults, memory_order_relaxed);
     report->allocations = lw_allocations_count();
-    report->faults |= find_faults(health, n) | find_new_counts(health, refusals);
+    report->faults |= find_faults(health, n);
+    report->faults |= find_counted(health, refusals, newest != NULL ? newest->time_ns : 0);
     health->faults_ever |= report->faults;
     report->faults_ever = health->faults_ever;
 }

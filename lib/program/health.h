@@ -42,6 +42,12 @@ struct lw_histogram {
     int64_t over, max_ns;
 };
 
+// A count whose growth is a fault.
+struct lw_counter {
+    int64_t before;   // at the last report
+    int64_t until_ns; // the fault shows, time of records
+};
+
 struct lw_health {
     // real-time thread -> normal thread
     struct lw_ring ring;
@@ -55,7 +61,7 @@ struct lw_health {
     int64_t *sorted; // room for one second of values
     int64_t period_ns;
     int64_t ticks, stale_ticks, unsent, first_skipped;
-    int64_t bad_before, foreign_before, lost_before; // counts at the report before
+    struct lw_counter bad, foreign, lost; // messages refused, records
     unsigned faults_ever;
     struct lw_histogram wake, exec, age;
 };
