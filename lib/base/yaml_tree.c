@@ -12,34 +12,80 @@
 #include <stdio.h>  // snprintf
 #include <string.h> // strlen, strcmp
 
-// Whether another document follows, or what follows is not YAML.
-static bool has_more(yaml_parser_t *parser)
+// libyaml's time grows with the square of the depth, and of the number of anchors: no text of ours needs more.
+enum { DEPTH_MAX = 16, NODES_MAX = 10000 };
+
+// --- parse ---
+
+struct shape {
+    int depth, nodes, documents;
+};
+
+static void count(struct shape *shape, yaml_event_type_t type)
 {
-    yaml_document_t next;
-    if (yaml_parser_load(parser, &next) == 0)
-        return true;
-    const bool more = yaml_document_get_root_node(&next) != NULL;
-    yaml_document_delete(&next);
-    return more;
+    const bool opens = type == YAML_SEQUENCE_START_EVENT || type == YAML_MAPPING_START_EVENT;
+    const bool closes = type == YAML_SEQUENCE_END_EVENT || type == YAML_MAPPING_END_EVENT;
+    shape->depth += opens - closes;
+    shape->nodes += opens || type == YAML_SCALAR_EVENT || type == YAML_ALIAS_EVENT;
+    shape->documents += type == YAML_DOCUMENT_START_EVENT;
+}
+
+// What is wrong with a shape, or NULL.
+static const char *find_excess(const struct shape *shape)
+{
+    if (shape->documents > 1)
+        return "expected one YAML document, found more behind it";
+    if (shape->depth > DEPTH_MAX)
+        return "expected lists and mappings at most 16 deep";
+    return shape->nodes > NODES_MAX ? "expected at most 10000 values" : NULL;
+}
+
+static bool start(yaml_parser_t *parser, const char *text, char *problem, size_t size)
+{
+    if (!yaml_parser_initialize(parser)) {
+        snprintf(problem, size, ": out of memory");
+        return false;
+    }
+    yaml_parser_set_input_string(parser, (const unsigned char *)text, strlen(text));
+    return true;
+}
+
+static bool refuse(const yaml_parser_t *parser, char *problem, size_t size)
+{
+    snprintf(problem, size, ":%zu: not YAML: %s", parser->problem_mark.line + 1,
+             parser->problem ? parser->problem : "unreadable");
+    return false;
+}
+
+// Goes through the whole text before a tree is made of it.
+static bool check_shape(yaml_parser_t *parser, char *problem, size_t size)
+{
+    struct shape shape = {0};
+    const char *excess = NULL;
+    for (bool ended = false; !ended && excess == NULL;) {
+        yaml_event_t event;
+        if (yaml_parser_parse(parser, &event) == 0)
+            return refuse(parser, problem, size);
+        count(&shape, event.type);
+        excess = find_excess(&shape);
+        if (excess != NULL)
+            snprintf(problem, size, ":%zu: %s", event.start_mark.line + 1, excess);
+        ended = event.type == YAML_STREAM_END_EVENT;
+        yaml_event_delete(&event);
+    }
+    return excess == NULL;
 }
 
 bool lw_tree_parse(struct lw_tree *tree, const char *text, char *problem, size_t size)
 {
     yaml_parser_t parser;
-    if (!yaml_parser_initialize(&parser)) {
-        snprintf(problem, size, ": out of memory");
+    if (!start(&parser, text, problem, size))
         return false;
-    }
-    yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
-    bool ok = yaml_parser_load(&parser, &tree->document) != 0;
-    if (!ok) {
-        snprintf(problem, size, ":%zu: not YAML: %s", parser.problem_mark.line + 1,
-                 parser.problem ? parser.problem : "unreadable");
-    } else if (has_more(&parser)) {
-        snprintf(problem, size, ": expected one YAML document, found more behind it");
-        lw_tree_free(tree);
-        ok = false;
-    }
+    bool ok = check_shape(&parser, problem, size);
+    yaml_parser_delete(&parser);
+    if (!ok || !start(&parser, text, problem, size))
+        return false;
+    ok = yaml_parser_load(&parser, &tree->document) != 0 || refuse(&parser, problem, size);
     yaml_parser_delete(&parser);
     return ok;
 }

@@ -178,8 +178,8 @@ static void broken_yaml_is_refused_with_its_line(void **state)
                   {"number: 1\n\tinteger: 2\n", "f.yaml:2: not YAML: "},
                   {"number: \"1\n", "f.yaml:2: not YAML: "},
                   {"number: 1\nchoice: *nobody\n", "f.yaml:2: not YAML: "},
-                  {"number: 1\n---\nnumber: 2\n", "f.yaml: expected one YAML document"},
-                  {"number: 1\n...\n\"", "f.yaml: expected one YAML document"}};
+                  {"number: 1\n---\nnumber: 2\n", "f.yaml:2: expected one YAML document"},
+                  {"number: 1\n...\n\"", "f.yaml:3: not YAML: "}};
     for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
         struct sample s = defaults();
         const struct sample before = s;
@@ -187,6 +187,29 @@ static void broken_yaml_is_refused_with_its_line(void **state)
         assert_int_equal(read_with(broken[i].text, NULL, 0, &s, &error), LW_E_SCENE);
         assert_memory_equal(error.text, broken[i].where, strlen(broken[i].where));
         assert_same_bits(&s, &before, sizeof s);
+    }
+}
+
+// A text that would keep libyaml busy for minutes is refused as soon as its shape shows: 1 MB of brackets.
+static void texts_of_excessive_shape_are_refused_at_once(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *part;
+        int times;
+        const char *words;
+    } cases[] = {{"[", 1000000, "f.yaml:1: expected lists and mappings at most 16 deep"},
+                 {"{a: ", 250000, "f.yaml:1: expected lists and mappings at most 16 deep"},
+                 {"- &a b\n", 10000, "f.yaml:10000: expected at most 10000 values"},
+                 {"- b\n", 9999, "f.yaml:1: expected keys with values, found a list of 9999"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const size_t length = strlen(cases[i].part), size = length * (size_t)cases[i].times;
+        char *text = calloc(1, size + 1);
+        assert_non_null(text);
+        for (size_t at = 0; at < size; at += length)
+            memcpy(text + at, cases[i].part, length);
+        refuse(text, cases[i].words);
+        free(text);
     }
 }
 
@@ -267,6 +290,7 @@ int main(void)
         cmocka_unit_test(keys_are_checked),
         cmocka_unit_test(missing_keys_are_named_with_what_they_accept),
         cmocka_unit_test(broken_yaml_is_refused_with_its_line),
+        cmocka_unit_test(texts_of_excessive_shape_are_refused_at_once),
         cmocka_unit_test(overrides_replace_and_add),
         cmocka_unit_test(overrides_replace_whole_lists_and_sections),
         cmocka_unit_test(overrides_satisfy_required_keys),
