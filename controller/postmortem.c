@@ -74,7 +74,7 @@ static int write_heard(struct writer *w, const struct lw_heard *heard, int from,
         const struct lw_heard_message *m = &heard->newest[(oldest + from) % LW_HEARD_MAX];
         if (m->time_ns > until_ns)
             break;
-        write_at(w, m->channel, &m->message, m->time_ns);
+        write_at(w, (enum lw_channel)m->channel, &m->message, m->time_ns);
     }
     return from;
 }
@@ -108,7 +108,7 @@ static void make_path(const struct lw_program *program, unsigned fault, char pat
     char when[32];
     const time_t now = time(NULL);
     struct tm local;
-    strftime(when, sizeof when, "%Y%m%d-%H%M%S", localtime_r(&now, &local));
+    (void)strftime(when, sizeof when, "%Y%m%d-%H%M%S", localtime_r(&now, &local));
     snprintf(path, PATH_MAX_BYTES, "%s/postmortem-%s-%s.lcm", program->postmortem, when, fault_name(fault));
 }
 

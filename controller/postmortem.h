@@ -22,7 +22,7 @@ struct lw_heard {
     pthread_mutex_t lock;
     struct lw_world before; // all older messages merged
     struct lw_heard_message {
-        enum lw_channel channel;
+        int channel; // enum lw_channel
         union lw_message message;
         int64_t time_ns;
     } newest[LW_HEARD_MAX];

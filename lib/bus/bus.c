@@ -143,6 +143,10 @@ static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *use
 enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler, void *user,
                                 struct lw_error *error)
 {
+    if (bus->lcm == NULL && bus->datagram.channel[0] != '\0') {
+        snprintf(error->text, sizeof error->text, "a socket of its own receives one channel");
+        return LW_E_BUS;
+    }
     struct lw_subscription *s = &bus->subscription[channel];
     *s = (struct lw_subscription){.bus = bus, .channel = channel, .handler = handler, .user = user};
     if (bus->lcm == NULL)
@@ -191,6 +195,8 @@ static struct lw_stamp make_stamp(const struct lw_bus *bus, int64_t seq)
 
 enum lw_status lw_bus_publish(struct lw_bus *bus, enum lw_channel channel, union lw_message *message)
 {
+    if (bus->lcm == NULL)
+        return LW_E_BUS;
     message->stamp = make_stamp(bus, ++bus->seq[channel]);
     const uint32_t size = lw_wire_encode(channel, message, bus->buffer);
     return lcm_publish(bus->lcm, bus->channel_name[channel], bus->buffer, size) == 0 ? LW_OK : LW_E_BUS;

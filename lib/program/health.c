@@ -28,12 +28,13 @@ bool lw_health_init(struct lw_health *health, int64_t period_ns)
     while (capacity < (size_t)(RING_S * rate))
         capacity *= 2;
     *health = (struct lw_health){.period_ns = period_ns, .capacity = (int)(LW_HEALTH_PAST_S * rate)};
-    health->ring.slots = calloc(capacity, sizeof(struct lw_record));
+    void *slots = calloc(capacity, sizeof(struct lw_record));
+    health->ring.slots = slots;
     health->past = calloc((size_t)health->capacity, sizeof *health->past);
     health->sorted = calloc((size_t)health->capacity, sizeof *health->sorted);
-    if (health->ring.slots == NULL || health->past == NULL || health->sorted == NULL)
+    if (slots == NULL || health->past == NULL || health->sorted == NULL)
         return false;
-    lw_ring_init(&health->ring, health->ring.slots, sizeof(struct lw_record), capacity);
+    lw_ring_init(&health->ring, slots, sizeof(struct lw_record), capacity);
     return true;
 }
 

@@ -25,6 +25,8 @@ TYPES = {
     "OBSTACLES": wire.obstacles_t,
     "GOAL": wire.goal_t,
     "SCENE": wire.scene_t,
+    "STATUS": wire.status_t,
+    "PLANT_STATUS": wire.status_t,
 }
 
 
