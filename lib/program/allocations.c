@@ -8,18 +8,11 @@
 // Errors   see allocations.h.
 #include "program/allocations.h"
 
-#include <errno.h>     // ENOMEM
+#include <errno.h>     // EINVAL, ENOMEM
 #include <stdatomic.h> // atomic_int_fast64_t
 #include <stdlib.h>    // malloc
 
-#ifdef __has_feature
-#define HAS(feature) __has_feature(feature)
-#else
-#define HAS(feature) 0
-#endif
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || HAS(address_sanitizer) ||                         \
-    HAS(thread_sanitizer) || !defined(__GLIBC__)
+#if !LW_ALLOCATIONS_COUNTED
 
 bool lw_allocations_watch(void)
 {
@@ -94,6 +87,8 @@ void *aligned_alloc(size_t alignment, size_t size)
 
 int posix_memalign(void **out, size_t alignment, size_t size)
 {
+    if (alignment < sizeof(void *) || (alignment & (alignment - 1)) != 0)
+        return EINVAL;
     void *made = memalign(alignment, size);
     if (made != NULL)
         *out = made;

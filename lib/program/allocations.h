@@ -15,6 +15,19 @@
 
 #define LW_ALLOCATIONS_UNKNOWN INT64_C(-1)
 
+// Whether this build counts: sanitizers bring allocators of their own, and only glibc has what is counted over.
+#ifdef __has_feature
+#define LW_HAS_FEATURE(feature) __has_feature(feature)
+#else
+#define LW_HAS_FEATURE(feature) 0
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || LW_HAS_FEATURE(address_sanitizer) ||              \
+    LW_HAS_FEATURE(thread_sanitizer) || !defined(__GLIBC__)
+#define LW_ALLOCATIONS_COUNTED 0
+#else
+#define LW_ALLOCATIONS_COUNTED 1
+#endif
+
 // Starts watching the calling thread from a count of 0, after a call made on purpose has proven that the count works.
 // False where it does not.
 bool lw_allocations_watch(void);

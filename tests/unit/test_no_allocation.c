@@ -1,124 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The real-time path allocates nothing. This program defines the allocator's functions itself, over glibc's, and counts
-// every call of the process, of shared libraries too. First it proves that the count works.
+// The real-time path allocates nothing: neither tick nor plant, gate, wire, ring or phase lock. lib/program counts the
+// calls, shared libraries' too (test_allocations.c proves it).
 //
 // Units    none.
 // Frames   base frame.
 // Arrays   none.
 // Memory   counted.
 // Errors   cmocka's. Sanitizers bring allocators of their own: there the program ends with 77, skipped.
+#include "base/phase.h" // lw_phase_correct
+#include "base/ring.h"  // lw_ring_push
 #include "bus/datagram.h"
+#include "bus/gate.h" // lw_gate_judge
 #include "controller/tick.h"
 #include "datagram_packets.h" // make_packet
 #include "helpers.h"
+#include "program/allocations.h" // lw_allocations_*
 #include "simulator/plant.h"
 #include "wire_messages.h" // make
 
-#include <errno.h>      // ENOMEM
-#include <stdatomic.h>  // atomic_llong
 #include <sys/socket.h> // socketpair
 #include <unistd.h>     // close
 
-#ifdef __has_feature
-#define HAS(feature) __has_feature(feature)
-#else
-#define HAS(feature) 0
-#endif
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || HAS(address_sanitizer) || HAS(thread_sanitizer)
-
-int main(void)
-{
-    return 77;
-}
-
-#else
-
-// --- the counting allocator: the C library's names and prototypes, so its naming too ---
-// NOLINTBEGIN(bugprone-reserved-identifier,misc-use-internal-linkage,readability-*)
-
-static atomic_llong calls;
-
-void *__libc_malloc(size_t size);
-void *__libc_calloc(size_t count, size_t size);
-void *__libc_realloc(void *old, size_t size);
-void *__libc_memalign(size_t alignment, size_t size);
-void __libc_free(void *old);
-void *memalign(size_t alignment, size_t size);
-int posix_memalign(void **out, size_t alignment, size_t size);
-
-void *malloc(size_t size)
-{
-    atomic_fetch_add(&calls, 1);
-    return __libc_malloc(size);
-}
-
-void *calloc(size_t count, size_t size)
-{
-    atomic_fetch_add(&calls, 1);
-    return __libc_calloc(count, size);
-}
-
-void *realloc(void *old, size_t size)
-{
-    atomic_fetch_add(&calls, 1);
-    return __libc_realloc(old, size);
-}
-
-void free(void *old)
-{
-    atomic_fetch_add(&calls, 1);
-    __libc_free(old);
-}
-
-void *memalign(size_t alignment, size_t size)
-{
-    atomic_fetch_add(&calls, 1);
-    return __libc_memalign(alignment, size);
-}
-
-void *aligned_alloc(size_t alignment, size_t size)
-{
-    return memalign(alignment, size);
-}
-
-int posix_memalign(void **out, size_t alignment, size_t size)
-{
-    void *made = memalign(alignment, size);
-    if (made != NULL)
-        *out = made;
-    return made != NULL ? 0 : ENOMEM;
-}
-
-// NOLINTEND(bugprone-reserved-identifier,misc-use-internal-linkage,readability-*)
-
-// --- proof that the count works ---
-
-// Each function is counted, from here and from inside a shared library.
-static void the_count_sees_every_call(void **state)
-{
-    (void)state;
-    const long long before = atomic_load(&calls);
-    void *volatile block = malloc(1);
-    assert_int_equal(atomic_load(&calls), before + 1);
-    void *volatile larger = realloc(block, 2);
-    assert_int_equal(atomic_load(&calls), before + 2);
-    free(larger);
-    assert_int_equal(atomic_load(&calls), before + 3);
-    block = calloc(1, 1);
-    free(block);
-    assert_int_equal(atomic_load(&calls), before + 5);
-    block = aligned_alloc(64, 64);
-    free(block);
-    assert_int_equal(atomic_load(&calls), before + 7);
-    void *aligned = NULL;
-    assert_int_equal(posix_memalign(&aligned, 64, 64), 0);
-    free(aligned);
-    assert_int_equal(atomic_load(&calls), before + 9);
-    FILE *stream = tmpfile(); // a library that allocates for itself
-    assert_true(atomic_load(&calls) > before + 9);
-    assert_true(stream != NULL && fclose(stream) == 0);
-}
+enum { SKIPPED = 77 };
 
 // --- the real-time path ---
 
@@ -130,10 +33,16 @@ struct rig {
     struct lw_plant_state arm;
     struct lw_world world;
     struct lw_request request;
+    struct lw_gate gate;
+    struct lw_lease lease;
+    struct lw_ring ring;
+    struct lw_phase phase;
+    struct lw_joint_command slots[2];
 };
 
-// One period of the live programs without their sockets: state over the wire, tick, command over the wire, plant.
-static enum lw_status one_period(struct rig *rig, int64_t seq)
+// One period of the live programs without their sockets: state over the wire, tick, command over the wire, gate, plant.
+// Returns whether the command was taken.
+static bool one_period(struct rig *rig, int64_t seq)
 {
     unsigned char data[LW_WIRE_MAX];
     union lw_message m, heard;
@@ -147,9 +56,12 @@ static enum lw_status one_period(struct rig *rig, int64_t seq)
     const uint32_t size = lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &m, data);
     if (status == LW_OK)
         status = lw_wire_decode(LW_CHANNEL_JOINT_COMMAND, data, size, &heard);
+    (void)lw_phase_correct(&rig->phase, seq * 2000, seq * 1999, 2000, seq % 2);
+    const bool kept = lw_ring_push(&rig->ring, &heard.joint_command) && lw_ring_pop(&rig->ring, &heard.joint_command);
+    const enum lw_verdict verdict = lw_gate_judge(&rig->gate, &rig->lease, &heard.joint_command, seq, seq);
     lw_plant_obey(&rig->arm, &heard.joint_command, seq);
     lw_plant_step(&rig->plant, &rig->arm, seq);
-    return status;
+    return status == LW_OK && kept && verdict == LW_TAKEN;
 }
 
 static void tick_plant_and_wire_allocate_nothing(void **state)
@@ -163,14 +75,17 @@ static void tick_plant_and_wire_allocate_nothing(void **state)
     rig.world = (struct lw_world){.version = 1, .count = 3};
     for (int i = 0; i < 3; i++)
         rig.world.obstacle[i] = (struct lw_obstacle){.id = 1 + i, .p = {0.3 * i - 0.5, -0.6, 0.3}, .radius = 0.05};
+    rig.gate = (struct lw_gate){.plant_session = 1, .velocity = {9, 9, 9, 9, 9, 9}};
+    lw_ring_init(&rig.ring, rig.slots, sizeof rig.slots[0], 2);
     int refused = 0;
-    const long long before = atomic_load(&calls);
+    assert_true(lw_allocations_watch());
     for (int64_t seq = 1; seq <= 100000; seq++) {
         rig.request = (struct lw_request){.stamp = {.session = 9, .seq = seq / 1000},
                                           .goal = {0.4, 0.1, 0.0001 * (double)(seq % 5000)}};
-        refused += one_period(&rig, seq) != LW_OK;
+        refused += !one_period(&rig, seq);
     }
-    assert_int_equal(atomic_load(&calls), before);
+    assert_int_equal(lw_allocations_count(), 0);
+    lw_allocations_unwatch();
     assert_int_equal(refused, 0);
     assert_int_equal(rig.arm.tick, 100000); // it did run
 }
@@ -182,7 +97,7 @@ static void every_channel_allocates_nothing(void **state)
     struct random random = {101};
     static struct lw_world world;
     int taken = 0, refused = 0;
-    const long long before = atomic_load(&calls);
+    assert_true(lw_allocations_watch());
     for (int n = 0; n < 100000; n++) {
         const enum lw_channel channel = (enum lw_channel)(n % LW_CHANNEL_COUNT);
         const union lw_message m = make(&random, channel);
@@ -196,7 +111,8 @@ static void every_channel_allocates_nothing(void **state)
             (void)(lw_world_apply(&world, &out.obstacles) == LW_OK);
         *(ok ? &taken : &refused) += 1;
     }
-    assert_int_equal(atomic_load(&calls), before);
+    assert_int_equal(lw_allocations_count(), 0);
+    lw_allocations_unwatch();
     assert_true(taken > 1000 && refused > 1000 && world.version > 10);
 }
 
@@ -210,7 +126,7 @@ static void reception_allocates_nothing(void **state)
     static struct lw_datagram d;
     d = (struct lw_datagram){.channel = "GOAL", .fd = pair[1], .timeout_ms = -1};
     int heard = 0, nothing = 0;
-    const long long before = atomic_load(&calls);
+    assert_true(lw_allocations_watch());
     for (int n = 0; n < 10000; n++) {
         const void *payload = NULL;
         uint32_t size = 0;
@@ -219,7 +135,8 @@ static void reception_allocates_nothing(void **state)
             break;
         *(lw_datagram_receive(&d, n % 4, &payload, &size) == 1 ? &heard : &nothing) += 1;
     }
-    assert_int_equal(atomic_load(&calls), before);
+    assert_int_equal(lw_allocations_count(), 0);
+    lw_allocations_unwatch();
     assert_true(heard > 6000 && nothing > 3000 && d.refused > 3000);
     lw_datagram_close(&d);
     close(pair[0]);
@@ -228,12 +145,11 @@ static void reception_allocates_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_count_sees_every_call),
         cmocka_unit_test(tick_plant_and_wire_allocate_nothing),
         cmocka_unit_test(every_channel_allocates_nothing),
         cmocka_unit_test(reception_allocates_nothing),
     };
+    if (!LW_ALLOCATIONS_COUNTED)
+        return SKIPPED;
     return cmocka_run_group_tests_name("no_allocation", tests, NULL, NULL);
 }
-
-#endif
