@@ -7,10 +7,10 @@
 // Arrays   see bus/wire.h.
 // Memory   stack.
 // Errors   cmocka's.
-#include "base/vec.h" // lw_all_finite
 #include "bus/wire.h"
 #include "helpers.h"
 #include "wire_messages.h" // make, decode
+#include "wire_ranges.h"   // keeps_its_ranges
 
 #include <leeway_obstacles_t.h> // counts and unused entries that lw_wire_encode never writes
 
@@ -127,72 +127,6 @@ static void commands_from_before_time_are_refused(void **state)
 }
 
 // --- random bytes ---
-
-static bool within(const double *values, int n, double limit)
-{
-    bool ok = lw_all_finite(values, n);
-    for (int i = 0; i < n; i++)
-        ok = ok && fabs(values[i]) <= limit;
-    return ok;
-}
-
-static bool obstacles_keep_their_ranges(const struct lw_obstacle_change *c)
-{
-    bool ok = c->count >= 0 && c->count <= LW_CHANGE_MAX;
-    for (int i = 0; i < c->count; i++) {
-        const struct lw_obstacle *o = &c->obstacle[i];
-        ok = ok && o->id > 0 && within(o->p, 3, 100) && within(&o->radius, 1, 100) && o->radius >= 0;
-        for (int k = 0; k < i; k++)
-            ok = ok && c->obstacle[k].id != o->id;
-    }
-    return ok;
-}
-
-static bool state_keeps_its_ranges(const struct lw_joint_state *s)
-{
-    return within(s->q, LW_NJ, 1e6) && within(s->qd, LW_NJ, 1e6) && (unsigned)s->mode <= LW_PLANT_ENDED &&
-           s->period_ns > 0 && s->period_ns <= 1000000000 && s->tick >= 0;
-}
-
-static bool command_keeps_its_ranges(const struct lw_joint_command *c)
-{
-    return c->state_tick >= 0 && within(c->qd, LW_NJ, 1e6) && (unsigned)c->mode <= LW_COMMAND_VELOCITY;
-}
-
-static bool report_keeps_its_ranges(const struct lw_report *r)
-{
-    const int64_t counts[] = {r->ticks, r->skipped, r->stale_ticks, r->unsent,       r->peer_session,
-                              r->taken, r->missed,  r->takeovers,   r->minor_faults, r->major_faults};
-    bool ok = (unsigned)r->state <= LW_ENDING && r->period_ns > 0 && r->period_ns <= 1000000000;
-    ok = ok && r->allocations >= -1 && lw_all_finite(&r->distance, 1);
-    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
-        ok = ok && counts[i] >= 0;
-    for (int i = 0; i < LW_REFUSED_COUNT; i++)
-        ok = ok && r->refused[i] >= 0;
-    return ok;
-}
-
-static bool values_keep_their_ranges(enum lw_channel channel, const union lw_message *m)
-{
-    switch (channel) {
-    case LW_CHANNEL_JOINT_STATE: return state_keeps_its_ranges(&m->joint_state);
-    case LW_CHANNEL_JOINT_COMMAND: return command_keeps_its_ranges(&m->joint_command);
-    case LW_CHANNEL_OBSTACLES:
-    case LW_CHANNEL_WORLD: return obstacles_keep_their_ranges(&m->obstacles);
-    case LW_CHANNEL_GOAL: return within(m->request.goal, 3, 100);
-    case LW_CHANNEL_STATUS:
-    case LW_CHANNEL_PLANT_STATUS: return report_keeps_its_ranges(&m->report);
-    case LW_CHANNEL_STOP:
-    case LW_CHANNEL_COUNT: break;
-    }
-    return true;
-}
-
-// What every accepted message promises.
-static bool keeps_its_ranges(enum lw_channel channel, const union lw_message *m)
-{
-    return m->stamp.session > 0 && m->stamp.seq > 0 && values_keep_their_ranges(channel, m);
-}
 
 static void fill_random(struct random *random, unsigned char *data, uint32_t size)
 {
