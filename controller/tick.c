@@ -118,6 +118,7 @@ static enum lw_law_outcome ask_law(const struct lw_controller *config, const str
 // --- explain ---
 
 // Digest of all that the tick was given, so that a replay can tell that it was given the same.
+// tools/leeway/replay/digest.py names these values in this order.
 static int64_t digest_input(const struct lw_controller_state *state, const struct lw_tick_input *in)
 {
     const struct lw_joint_state *joint = in->joint;

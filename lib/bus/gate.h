@@ -11,7 +11,7 @@
 #define LW_BUS_GATE_H
 
 #include "arm/joint.h"    // struct lw_joint_command
-#include "base/refusal.h" // enum lw_verdict
+#include "base/verdict.h" // enum lw_verdict
 
 #include <stdbool.h> // bool
 

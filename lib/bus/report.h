@@ -9,7 +9,7 @@
 #ifndef LW_BUS_REPORT_H
 #define LW_BUS_REPORT_H
 
-#include "base/refusal.h" // LW_REFUSED_COUNT
+#include "base/verdict.h" // LW_REFUSED_COUNT
 #include "base/stamp.h"   // struct lw_stamp
 
 enum lw_run_state { LW_STARTING, LW_RUN_WAITING, LW_RUNNING, LW_STOPPING, LW_ENDING };

@@ -9,10 +9,11 @@
 #ifndef LW_PROGRAM_HEALTH_H
 #define LW_PROGRAM_HEALTH_H
 
-#include "arm/joint.h"  // struct lw_joint_state, struct lw_joint_command
-#include "base/ring.h"  // struct lw_ring
-#include "bus/gate.h"   // struct lw_lease
-#include "bus/report.h" // struct lw_report
+#include "arm/joint.h"    // struct lw_joint_state, struct lw_joint_command
+#include "base/ring.h"    // struct lw_ring
+#include "bus/gate.h"     // struct lw_lease
+#include "base/refusal.h" // struct lw_refusals
+#include "bus/report.h"   // struct lw_report
 
 #include <stdatomic.h> // atomic_int_fast64_t
 #include <stdbool.h>   // bool

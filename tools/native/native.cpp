@@ -6,7 +6,8 @@
 // Arrays   float64, C order, batches over all leading axes.
 // Memory   results are owned by Python.
 // Errors   ValueError with the C code's text.
-#include "scene.hpp" // Scene
+#include "replay.hpp" // bind_replay
+#include "scene.hpp"  // Scene
 
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
@@ -178,4 +179,5 @@ NB_MODULE(_native, m)
           "Reads a scene from YAML text; sets is a list of \"key=value\".");
     m.def("describe_scene", &describe_scene, "Reference of all keys of a scene, for people.");
     m.def("simulate", &simulate, nb::arg("scene"), "Runs a scene in process; arrays by name.");
+    bind_replay(m);
 }

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Replay for Python.
+//
+// Units    see replay.hpp.
+// Frames   see replay.hpp.
+// Arrays   see replay.hpp.
+// Memory   see replay.hpp.
+// Errors   see replay.hpp.
+#include "replay.hpp"
+
+#include "scene.hpp" // Scene
+
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+
+#include <algorithm> // copy
+#include <array>
+#include <cstdint>   // int64_t
+#include <optional>  // optional
+#include <stdexcept> // invalid_argument
+
+extern "C" {
+#include "bus/wire.h"        // lw_wire_*
+#include "controller/tick.h" // lw_tick
+}
+
+namespace nb = nanobind;
+
+namespace
+{
+
+// A message of a log as the programs take it: decoded and validated by the same code.
+bool decode(lw_channel channel, const nb::bytes &data, lw_message &message)
+{
+    return lw_wire_decode(channel, data.data(), static_cast<uint32_t>(data.size()), &message) == LW_OK;
+}
+
+struct World {
+    lw_world data = {};
+
+    bool apply(const nb::bytes &obstacles)
+    {
+        lw_message message;
+        return decode(LW_CHANNEL_OBSTACLES, obstacles, message) && lw_world_apply(&data, &message.obstacles) == LW_OK;
+    }
+
+    // What a command echoes of its world.
+    nb::tuple echo() const
+    {
+        return nb::make_tuple(data.last.session, data.last.seq, data.version);
+    }
+
+    // Takes the echo of a command for a world whose history is not known.
+    void adopt(int64_t session, int64_t seq, int64_t version)
+    {
+        data.last.session = session;
+        data.last.seq = seq;
+        data.version = version;
+    }
+
+    nb::list obstacles() const
+    {
+        nb::list out;
+        for (int i = 0; i < data.count; i++) {
+            const lw_obstacle &o = data.obstacle[i];
+            out.append(nb::make_tuple(o.id, nb::make_tuple(o.p[0], o.p[1], o.p[2]), o.radius));
+        }
+        return out;
+    }
+};
+
+struct Controller {
+    lw_controller config = {};
+    lw_controller_state state = {}, before = {};
+    lw_joint_state joint = {};
+    lw_request asked = {};
+
+    Controller(const Scene &scene, int64_t session)
+    {
+        if (lw_controller_init(&config, &state, &scene.data, session) != LW_OK)
+            throw std::invalid_argument("no controller can run this scene: its robot or law is unknown");
+        before = state;
+    }
+
+    // None is the state before the first one was heard.
+    bool joint_state(const std::optional<nb::bytes> &data)
+    {
+        lw_message message = {};
+        if (data && !decode(LW_CHANNEL_JOINT_STATE, *data, message))
+            return false;
+        joint = data ? message.joint_state : lw_joint_state{};
+        return true;
+    }
+
+    bool request(const nb::bytes &data, bool stop)
+    {
+        lw_message message;
+        if (!decode(stop ? LW_CHANNEL_STOP : LW_CHANNEL_GOAL, data, message))
+            return false;
+        asked = message.request;
+        return true;
+    }
+
+    // A request counts for one tick: its repetitions change nothing.
+    nb::bytes tick(int64_t time_ns, int64_t state_age_ns, bool warming_up, const World &world)
+    {
+        const lw_tick_input in = {time_ns, state_age_ns, warming_up, &joint, &world.data, &asked};
+        lw_message message = {};
+        unsigned char wire[LW_WIRE_MAX];
+        before = state;
+        lw_tick(&config, &state, &in, &message.joint_command);
+        asked = {};
+        const uint32_t size = lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &message, wire);
+        return nb::bytes(wire, size);
+    }
+
+    nb::tuple in_force() const
+    {
+        const lw_stamp &stamp = state.request.stamp;
+        return nb::make_tuple(state.request.kind == LW_REQUEST_STOP, stamp.session, stamp.seq);
+    }
+
+    // Goes on from a recorded command, whose own inputs are not known.
+    void adopt(int64_t tick, int64_t plant_session, int64_t state_seq, const std::array<double, LW_NJ> &qd)
+    {
+        state.tick = tick;
+        state.plant_session = plant_session;
+        state.state_seq = state_seq;
+        std::copy(qd.begin(), qd.end(), state.velocity);
+    }
+
+    void adopt_request(int64_t session, int64_t seq, bool stop, const std::array<double, 3> &goal)
+    {
+        lw_request request = {};
+        request.stamp.session = session;
+        request.stamp.seq = seq;
+        request.kind = stop ? LW_REQUEST_STOP : LW_REQUEST_GOAL;
+        std::copy(goal.begin(), goal.end(), request.goal);
+        (void)lw_request_is_new(&state.requests, &request);
+        state.request = request;
+    }
+};
+
+} // namespace
+
+void bind_replay(nb::module_ &m)
+{
+    nb::class_<World>(m, "World", "The set of obstacles that a controller believes in.")
+        .def(nb::init<>(), "Nothing heard yet.")
+        .def(
+            "copy", [](const World &w) { return w; }, "The same world, to go on from.")
+        .def("apply", &World::apply, nb::arg("obstacles"), "Takes an OBSTACLES message; False when it is refused.")
+        .def("adopt", &World::adopt, nb::arg("session"), nb::arg("seq"), nb::arg("version"),
+             "Takes the echo of a command for a world whose history is not known.")
+        .def("obstacles", &World::obstacles, "(id, (x, y, z) m, radius m) of each, in the controller's order.")
+        .def_prop_ro("echo", &World::echo, "Session and seq of the newest message, number of changes.")
+        .def_prop_ro(
+            "count", [](const World &w) { return w.data.count; }, "Number of obstacles.")
+        .def_prop_ro("digest", [](const World &w) { return w.data.digest; }, "Digest of the obstacles.");
+
+    nb::class_<Controller>(m, "Controller", "The controller's tick, fed with messages of a log.")
+        .def(nb::init<const Scene &, int64_t>(), nb::arg("scene"), nb::arg("session"),
+             "A controller as its process starts; session is the one it sends with.")
+        .def("joint_state", &Controller::joint_state, nb::arg("data").none(),
+             "Takes the JOINT_STATE of the next ticks; False when it is refused. None: none heard yet.")
+        .def("request", &Controller::request, nb::arg("data"), nb::arg("stop"),
+             "Takes a GOAL or STOP for the next tick; False when it is refused.")
+        .def(
+            "shutdown", [](Controller &c) { c.asked = lw_request_shutdown; },
+            "Takes the stop that the process asks of itself at its end, for the next tick.")
+        .def("tick", &Controller::tick, nb::arg("time_ns"), nb::arg("state_age_ns"), nb::arg("warming_up"),
+             nb::arg("world"), "One tick; returns JOINT_COMMAND without what the process fills in.")
+        .def(
+            "undo", [](Controller &c) { c.state = c.before; }, "Back to before the last tick.")
+        .def("adopt", &Controller::adopt, nb::arg("tick"), nb::arg("plant_session"), nb::arg("state_seq"),
+             nb::arg("qd"), "Goes on from a recorded command whose own inputs are not known.")
+        .def("adopt_request", &Controller::adopt_request, nb::arg("session"), nb::arg("seq"), nb::arg("stop"),
+             nb::arg("goal"), "Sets the request in force to that of a recorded command.")
+        .def_prop_ro("in_force", &Controller::in_force,
+                     "Request in force: whether a stop, session, seq; 0 = the scene's.")
+        .def_prop_ro("ticks", [](const Controller &c) { return c.state.tick; }, "Ticks so far.");
+    m.attr("SHUTDOWN") = lw_request_shutdown.stamp.session;
+}
