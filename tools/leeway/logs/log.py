@@ -1,7 +1,6 @@
-"""LCM logs of runs: framing, decoding, columns.
+"""LCM logs of runs: decoding, columns.
 
-The framing is read here and not by `lcm.EventLog`, which cannot tell a whole log from one that
-was cut. The layout of the messages comes from the generated `leeway_lcm` classes.
+The layout of the messages comes from the generated `leeway_lcm` classes.
 
 Units are SI (m, rad, s) except where a name ends in `_ns` or `_us`, and `utime` (us since 1970).
 """
@@ -14,21 +13,20 @@ import struct
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from stat import S_ISREG
-from typing import Any, BinaryIO, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from leeway_lcm import leeway as _generated
 from numpy.typing import NDArray
+
+from leeway.logs.framing import LogError as LogError  # callers of this module catch it
+from leeway.logs.framing import open_events
 
 wire = cast(Any, _generated)  # generated code carries no types: this is where they end
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SYNC = 0xEDA1DA01
-_HEADER = struct.Struct(">IqqII")  # sync, event number, time us, lengths of channel and data
-_CHANNEL_MAX = 1000  # bytes; LCM itself stays below 64
 _FINGERPRINT = 8  # bytes
 _ROBOT_CHANNEL = re.compile(r"(?:(.+)_)?(JOINT_STATE|JOINT_COMMAND|GOAL|STOP|SCENE)")
 _SCALARS = {"int8_t": ">i1", "int32_t": ">i4", "int64_t": ">i8", "double": ">f8"}
@@ -39,10 +37,6 @@ _FIXED = {
     "GOAL": wire.goal_t,
     "STOP": wire.stop_t,
 }
-
-
-class LogError(Exception):
-    """A log that cannot be used; the text says what was expected and what to do."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +150,36 @@ class SceneMessage:
 
 
 @dataclass(frozen=True)
+class Table:
+    """The messages of one channel as they are on the wire, one behind the other."""
+
+    order: Ints  # place of each in the log, from 0, counted over all channels
+    data: bytes
+    rows: NDArray[np.void]  # the same bytes, as fields by name; big-endian
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def message(self, row: int) -> bytes:
+        """Return the bytes of one message, fingerprint included."""
+        size = len(self.data) // len(self)
+        return self.data[row * size : (row + 1) * size]
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The messages of one robot in a log, undecoded."""
+
+    path: Path
+    robot: str  # prefix of its channels, "" = none
+    truncated: int  # bytes behind the last whole event
+    counts: dict[str, int]  # whole events per channel, foreign ones too
+    undecodable: dict[str, int]  # of those, messages of another layout, per channel
+    scenes: list[SceneMessage]
+    tables: dict[str, Table]  # by channel without prefix
+
+
+@dataclass(frozen=True)
 class Log:
     """The messages of one robot in a log."""
 
@@ -191,18 +215,31 @@ def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
     LogError
         The file cannot be read, is no LCM log, or holds no joint state of that robot.
     """
+    tables = read_tables(path, name)
+    by_name = tables.tables
+    return Log(
+        path=tables.path,
+        robot=tables.robot,
+        truncated=tables.truncated,
+        counts=tables.counts,
+        undecodable=tables.undecodable,
+        scenes=tables.scenes,
+        states=_columns(by_name["JOINT_STATE"], States),
+        commands=_columns(by_name["JOINT_COMMAND"], Commands),
+        obstacles=_columns(by_name["OBSTACLES"], Obstacles),
+        goals=_columns(by_name["GOAL"], Goals),
+        stops=_columns(by_name["STOP"], Stops),
+    )
+
+
+def read_tables(path: str | os.PathLike[str], name: str | None = None) -> Tables:
+    """Read the messages of one robot as bytes; arguments and errors as in `read_log`."""
     path = Path(path)
-    try:
-        if not S_ISREG(path.stat().st_mode):
-            raise LogError(f"{path}: expected a log file, found something else")
-        with path.open("rb") as file:
-            raw = _scan(path, file)
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
-    return _decode(path, raw, _choose_robot(path, raw, name))
+    raw = _scan(path)
+    return _sort(path, raw, _choose_robot(path, raw, name))
 
 
-# --- framing ---
+# --- collecting ---
 
 
 @dataclass
@@ -212,49 +249,20 @@ class _Raw:
     counts: Counter[str] = field(default_factory=Counter)
     order: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     data: defaultdict[str, list[bytes]] = field(default_factory=lambda: defaultdict(list))
-    events: int = 0
     left: int = 0
 
 
-def _scan(path: Path, file: BinaryIO) -> _Raw:
-    """Collect whole events; stop at the first that is cut or damaged."""
-    size = os.fstat(file.fileno()).st_size
-    if size == 0:
-        raise LogError(f"{path}: empty: was lcm-logger stopped before anything was sent?")
+def _scan(path: Path) -> _Raw:
+    """Collect the messages of whole events."""
     raw = _Raw()
-    whole = 0
-    while len(head := file.read(_HEADER.size)) == _HEADER.size:
-        sync, _, _, channel_length, data_length = _HEADER.unpack(head)
-        end = whole + _HEADER.size + channel_length + data_length
-        if sync != SYNC or channel_length > _CHANNEL_MAX or end > size:
-            break
-        body = file.read(channel_length + data_length)
-        _keep(raw, body[:channel_length].decode("ascii", "replace"), body[channel_length:])
-        whole = end
-    if whole == 0:
-        _refuse(path, file)
-    raw.left = size - whole
+    with open_events(path) as events:
+        for number, (_, _, channel, data) in enumerate(events):
+            raw.counts[channel] += 1
+            if channel == "OBSTACLES" or _ROBOT_CHANNEL.fullmatch(channel):
+                raw.order[channel].append(number)
+                raw.data[channel].append(data)
+        raw.left = events.left
     return raw
-
-
-def _keep(raw: _Raw, channel: str, data: bytes) -> None:
-    raw.counts[channel] += 1
-    if channel == "OBSTACLES" or _ROBOT_CHANNEL.fullmatch(channel):
-        raw.order[channel].append(raw.events)
-        raw.data[channel].append(data)
-    raw.events += 1
-
-
-def _refuse(path: Path, file: BinaryIO) -> None:
-    """Say why a file has no whole event."""
-    file.seek(0)
-    start = file.read(4)
-    if start == struct.pack(">I", SYNC):
-        raise LogError(f"{path}: cut within its first event: nothing to read, record it again")
-    raise LogError(
-        f"{path}: not an LCM log: expected events that start with 0x{SYNC:X}, "
-        f"found 0x{start.hex().upper()} at byte 0"
-    )
 
 
 # --- decoding ---
@@ -274,6 +282,9 @@ def _scalar(typename: str) -> Any:
 
 
 _LAYOUT = {name: _dtype(kind) for name, kind in _FIXED.items()}
+_MESSAGE = {
+    name: np.dtype([("fingerprint", ">i8"), ("body", layout)]) for name, layout in _LAYOUT.items()
+}
 
 
 def _fingerprint(name: str) -> bytes:
@@ -322,51 +333,56 @@ def _listed(robots: list[str]) -> str:
     return "found " + ", ".join(robot or "one without a name" for robot in robots)
 
 
-def _decode(path: Path, raw: _Raw, robot: str) -> Log:
+def _sort(path: Path, raw: _Raw, robot: str) -> Tables:
+    """Make a table of each channel of a robot, of the messages that have the right layout."""
     undecodable: dict[str, int] = {}
-
-    def table(name: str, kind: type[MessagesT]) -> MessagesT:
+    tables = {}
+    for name in _FIXED:
         channel = _channel(robot, name)
-        pairs = [
-            p for p in zip(raw.order[channel], raw.data[channel], strict=True) if _fits(name, p[1])
-        ]
-        if len(pairs) < len(raw.order[channel]):
-            undecodable[channel] = len(raw.order[channel]) - len(pairs)
-        return _columns(_LAYOUT[name], pairs, kind)
-
+        tables[name] = _table(name, raw.order[channel], raw.data.pop(channel, []))
+        if len(tables[name]) < len(raw.order[channel]):
+            undecodable[channel] = len(raw.order[channel]) - len(tables[name])
     scene_channel = _channel(robot, "SCENE")
     scenes = [scene for data in raw.data[scene_channel] if (scene := _decode_scene(data))]
     if len(scenes) < len(raw.data[scene_channel]):
         undecodable[scene_channel] = len(raw.data[scene_channel]) - len(scenes)
-    return Log(
-        path=path,
-        robot=robot,
-        truncated=raw.left,
-        counts=dict(sorted(raw.counts.items())),
-        undecodable=undecodable,
-        scenes=scenes,
-        states=table("JOINT_STATE", States),
-        commands=table("JOINT_COMMAND", Commands),
-        obstacles=table("OBSTACLES", Obstacles),
-        goals=table("GOAL", Goals),
-        stops=table("STOP", Stops),
-    )
+    counts = dict(sorted(raw.counts.items()))
+    return Tables(path, robot, raw.left, counts, undecodable, scenes, tables)
 
 
-def _columns(
-    layout: np.dtype[Any], pairs: list[tuple[int, bytes]], kind: type[MessagesT]
-) -> MessagesT:
+def _table(name: str, order: list[int], messages: list[bytes]) -> Table:
+    fits = [k for k, data in enumerate(messages) if _fits(name, data)]
+    data = b"".join(messages[k] for k in fits)
+    return Table(np.array([order[k] for k in fits], dtype=np.int64), data, as_rows(name, data))
+
+
+def as_rows(name: str, data: bytes) -> NDArray[np.void]:
+    """Return messages of a channel as fields by name, without copying them.
+
+    Parameters
+    ----------
+    name
+        Channel without a robot's prefix.
+    data
+        Whole messages, one behind the other.
+    """
+    rows: NDArray[np.void] = np.frombuffer(data, dtype=_MESSAGE[name])["body"]
+    return rows
+
+
+def _columns(table: Table, kind: type[MessagesT]) -> MessagesT:
     """Turn messages of one layout into columns of this machine's own byte order."""
-    rows = np.frombuffer(b"".join(data[_FINGERPRINT:] for _, data in pairs), dtype=layout)
-    flat = {name: rows[name] for name in layout.names or () if name not in ("h", "o")}
+    rows = table.rows
+    names = rows.dtype.names or ()
+    flat = {name: rows[name] for name in names if name not in ("h", "o")}
     for group in ("h", "o"):
-        if group in (layout.names or ()):
+        if group in names:
             flat |= {name: rows[group][name] for name in rows[group].dtype.names or ()}
     columns = {
         name: values.astype("f8" if values.dtype.kind == "f" else "i8")
         for name, values in flat.items()
     }
-    return kind(order=np.array([order for order, _ in pairs], dtype=np.int64), **columns)
+    return kind(order=table.order, **columns)
 
 
 def _decode_scene(data: bytes) -> SceneMessage | None:
