@@ -7,6 +7,7 @@
 // Arrays   one entry a joint.
 // Memory   static.
 // Errors   cmocka's.
+#include "base/refusal.h"
 #include "bus/gate.h"
 #include "helpers.h"
 

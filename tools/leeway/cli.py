@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from leeway import cli_machine
+from leeway import cli_machine, cli_replay
 from leeway.options import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_USAGE, Common, command, fail
 
 if TYPE_CHECKING:
@@ -244,6 +244,8 @@ def info(log: LogArg, *, common: Common) -> None:
         print_info(analysis)
     _exit_with_losses([analysis])
 
+
+cli_replay.register(app)
 
 # --- bus ---
 

@@ -5,7 +5,7 @@ import inspect
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -52,22 +52,35 @@ class Common:
 
 
 def command(group: typer.Typer, name: str, example: str, **settings: Any) -> Callable[..., Any]:
-    """Register a command: its own parameters, then the common ones, handed over as `common`."""
+    """Register a command: its own parameters, then those of its groups.
+
+    A group is a parameter whose type is a dataclass, as `common`: its fields are the options.
+    """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
-        own = [p for p in inspect.signature(function).parameters.values() if p.name != "common"]
-        shared = list(inspect.signature(Common).parameters.values())
+        parameters = inspect.signature(function).parameters.values()
+        groups: dict[str, Any] = {
+            p.name: p.annotation for p in parameters if is_dataclass(p.annotation)
+        }
+        own = [p for p in parameters if p.name not in groups]
+        members = {
+            part: list(inspect.signature(kind).parameters.values()) for part, kind in groups.items()
+        }
+        options = own + [p for fields in members.values() for p in fields]
 
         @functools.wraps(function)
         def call(**values: Any) -> None:
-            common = Common(**{p.name: values.pop(p.name) for p in shared})
+            made = {
+                part: kind(**{p.name: values.pop(p.name) for p in members[part]})
+                for part, kind in groups.items()
+            }
             interrupt.raise_again()
-            function(common=common, **values)
+            function(**made, **values)
 
         call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
-            [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in own + shared]
+            [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in options]
         )
-        call.__annotations__ = {p.name: p.annotation for p in own + shared}
+        call.__annotations__ = {p.name: p.annotation for p in options}
         group.command(name, epilog=f"Example: {example}", **settings)(call)
         return function
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from leeway import _native
@@ -39,6 +39,18 @@ def progress_bar(label: str, duration_s: float, quiet: bool) -> Iterator[Callabl
     ) as bar:
         task = bar.add_task(label, total=duration_s)
         yield lambda seconds: bar.update(task, completed=min(seconds, duration_s))
+
+
+@contextmanager
+def count_bar(label: str, total: int, quiet: bool) -> Iterator[Callable[[int], None]]:
+    """Show how many of something are done on a terminal; nothing on a pipe."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(
+        *columns, console=console, disable=quiet or not console.is_terminal, transient=True
+    ) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.update(task, completed=done)
 
 
 @contextmanager

@@ -1,0 +1,1 @@
+"""Logs again: every tick recomputed from its recorded inputs, and messages sent once more."""
