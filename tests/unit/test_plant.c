@@ -207,6 +207,29 @@ static void any_moving_joint_is_not_rest(void **state)
     assert_true(lw_plant_at_rest(&rig.arm));
 }
 
+// --- end ---
+
+// A plant that ended says so, at the velocity it last had; a stop is no way back to life.
+static void a_plant_that_ended_says_so(void **state)
+{
+    (void)state;
+    struct rig rig = start();
+    struct lw_joint_state report;
+    accept(&rig, FIRST, 1, 0.06, 0);
+    lw_plant_step(&rig.plant, &rig.arm, 0);
+    rig.arm.mode = LW_PLANT_ENDED;
+    lw_plant_report(&rig.plant, &rig.arm, &report);
+    assert_int_equal(report.mode, LW_PLANT_ENDED);
+    assert_near(report.qd[0], 0.03, 1e-15);
+    lw_plant_stop(&rig.arm);
+    assert_int_equal(rig.arm.mode, LW_PLANT_ENDED);
+    // Stepped all the same, it ramps to rest and stays ended.
+    for (int k = 0; k < 5; k++)
+        lw_plant_step(&rig.plant, &rig.arm, 0);
+    assert_true(lw_plant_at_rest(&rig.arm));
+    assert_int_equal(rig.arm.mode, LW_PLANT_ENDED);
+}
+
 // --- set-up and report ---
 
 // Period and timeout come from the plant's own rate, whatever the controller's.
@@ -260,6 +283,7 @@ int main(void)
         cmocka_unit_test(limits_hold_and_are_used),
         cmocka_unit_test(stop_ramps_to_rest_until_commanded_again),
         cmocka_unit_test(any_moving_joint_is_not_rest),
+        cmocka_unit_test(a_plant_that_ended_says_so),
         cmocka_unit_test(the_plant_has_its_own_rate),
         cmocka_unit_test(the_report_is_the_state),
     };

@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tests of the digests of a tick's input and of a world: one bit of any field makes another, and nothing else does.
+//
+// Units    metres, radians; ns where a name says so.
+// Frames   base frame.
+// Arrays   none.
+// Memory   static.
+// Errors   cmocka's.
+#include "base/digest.h"
+#include "tick_rig.h" // start
+
+// All that a tick is given, in one piece, so that each of its bits can be changed.
+struct input {
+    int64_t time_ns, state_age_ns;
+    struct lw_joint_state joint;
+    struct lw_world world;
+    struct lw_request request;
+    bool warming_up;
+};
+
+// Digest of an input, from the same past each time.
+static int64_t digest_of(const struct rig *rig, const struct input *input)
+{
+    struct lw_controller_state past = rig->state;
+    struct lw_joint_command out;
+    const struct lw_tick_input in = {.time_ns = input->time_ns,
+                                     .state_age_ns = input->state_age_ns,
+                                     .warming_up = input->warming_up,
+                                     .joint = &input->joint,
+                                     .world = &input->world,
+                                     .request = &input->request};
+    lw_tick(&rig->config, &past, &in, &out);
+    return out.input_digest;
+}
+
+static struct input *make_input(struct rig *rig)
+{
+    static struct input input;
+    input = (struct input){.time_ns = INT64_C(123456789012), .state_age_ns = 3456, .joint = rig->joint};
+    input.joint.qd[2] = 0.5;
+    const struct lw_obstacle_change change = {.stamp = {1, 2, 3, 4},
+                                              .count = 2,
+                                              .obstacle = {{.id = 33, .p = {-0.35, -0.5, 0.36}, .radius = 0.08},
+                                                           {.id = 34, .p = {0.5, 0.5, 0.5}, .radius = 0}}};
+    assert_int_equal(lw_world_apply(&input.world, &change), LW_OK);
+    input.request = (struct lw_request){.stamp = {11, 12, 5, 6}, .kind = LW_REQUEST_GOAL, .goal = {0.3, -0.5, 0.3}};
+    return &input;
+}
+
+// Flips every bit of a field, one at a time.
+static void check_every_bit(const struct rig *rig, struct input *input, void *field, size_t size)
+{
+    const int64_t digest = digest_of(rig, input);
+    unsigned char *bytes = field;
+    for (size_t bit = 0; bit < 8 * size; bit++) {
+        bytes[bit / 8] = (unsigned char)(bytes[bit / 8] ^ (1u << (bit % 8)));
+        assert_int_not_equal(digest_of(rig, input), digest);
+        bytes[bit / 8] = (unsigned char)(bytes[bit / 8] ^ (1u << (bit % 8)));
+    }
+    assert_int_equal(digest_of(rig, input), digest);
+}
+
+#define CHECK_EVERY_BIT(field) check_every_bit(rig, input, &(field), sizeof(field))
+
+static void every_bit_of_the_input_counts(void **state)
+{
+    (void)state;
+    struct rig *rig = start();
+    struct input *input = make_input(rig);
+    CHECK_EVERY_BIT(input->time_ns);
+    CHECK_EVERY_BIT(input->state_age_ns);
+    CHECK_EVERY_BIT(input->joint.stamp); // four numbers without gaps
+    CHECK_EVERY_BIT(input->joint.mode);
+    CHECK_EVERY_BIT(input->joint.command_session);
+    CHECK_EVERY_BIT(input->joint.command_seq);
+    CHECK_EVERY_BIT(input->joint.tick);
+    CHECK_EVERY_BIT(input->joint.period_ns);
+    CHECK_EVERY_BIT(input->joint.q);
+    CHECK_EVERY_BIT(input->joint.qd);
+    CHECK_EVERY_BIT(input->world.version);
+    CHECK_EVERY_BIT(input->world.last.session);
+    CHECK_EVERY_BIT(input->world.last.seq);
+    CHECK_EVERY_BIT(input->world.digest);
+    CHECK_EVERY_BIT(input->request.stamp.session);
+    CHECK_EVERY_BIT(input->request.stamp.seq);
+    CHECK_EVERY_BIT(input->request.kind);
+    CHECK_EVERY_BIT(input->request.goal);
+    const int64_t digest = digest_of(rig, input);
+    input->warming_up = true;
+    assert_int_not_equal(digest_of(rig, input), digest);
+}
+
+// The same input has the same digest wherever it stands in memory and whatever the controller did before.
+static void equal_inputs_have_equal_digests(void **state)
+{
+    (void)state;
+    struct rig *rig = start();
+    static struct input copy;
+    struct input *input = make_input(rig);
+    const int64_t digest = digest_of(rig, input);
+    memset(&copy, 0x5a, sizeof copy);
+    copy = *input;
+    assert_int_equal(digest_of(rig, &copy), digest);
+    go_for(rig, 50); // another velocity, another tick
+    assert_true(speed(rig) > 0);
+    assert_int_equal(digest_of(rig, input), digest);
+}
+
+// The request counts that is in force, whether it comes again or not.
+static void the_request_in_force_counts(void **state)
+{
+    (void)state;
+    struct rig *rig = start();
+    struct input *input = make_input(rig);
+    const int64_t digest = digest_of(rig, input);
+    rig->request = input->request;
+    go(rig); // obeyed
+    assert_int_equal(digest_of(rig, input), digest);
+    input->request.goal[0] = 99; // a repetition that was changed on the way is not obeyed
+    assert_int_equal(digest_of(rig, input), digest);
+    input->request = (struct lw_request){0};
+    assert_int_equal(digest_of(rig, input), digest);
+}
+
+// Two digests that are equal in all but one bit of a word differ, at any place of the word in the row.
+static void a_changed_bit_is_never_lost(void **state)
+{
+    (void)state;
+    struct random random = {77};
+    for (int n = 0; n < 2000; n++) {
+        uint64_t words[8], a = LW_DIGEST_START, b = LW_DIGEST_START;
+        const int at = random_below(&random, 8), bit = random_below(&random, 64);
+        for (int i = 0; i < 8; i++) {
+            words[i] = random_bits(&random);
+            a = lw_digest_word(a, words[i]);
+            b = lw_digest_word(b, i == at ? words[i] ^ (UINT64_C(1) << bit) : words[i]);
+        }
+        assert_true(a != b);
+    }
+    const double zeros[2] = {0.0, -0.0};
+    assert_true(lw_digest_doubles(1, &zeros[0], 1) != lw_digest_doubles(1, &zeros[1], 1));
+    assert_true(lw_digest_doubles(1, zeros, 0) == 1);
+    // Order counts, and so does a zero more.
+    assert_true(lw_digest_int(lw_digest_int(1, 2), 3) != lw_digest_int(lw_digest_int(1, 3), 2));
+    assert_true(lw_digest_int(LW_DIGEST_START, 0) != LW_DIGEST_START);
+}
+
+// --- the world ---
+
+enum { MINE = 7, YOURS = 8 };
+static const struct lw_obstacle none = {0};
+
+static struct lw_obstacle ball(int id, double x)
+{
+    return (struct lw_obstacle){.id = id, .p = {x, 2 * x, 0.5}, .radius = 0.1};
+}
+
+// A change of one or two obstacles; id 0 = none.
+static enum lw_status apply(struct lw_world *world, int64_t session, enum lw_change_op op, struct lw_obstacle a,
+                            struct lw_obstacle b)
+{
+    const struct lw_obstacle_change c = {.stamp = {.session = session, .seq = world->last.seq + 1},
+                                         .op = op,
+                                         .count = (a.id != 0) + (b.id != 0),
+                                         .obstacle = {a, b}};
+    return lw_world_apply(world, &c);
+}
+
+static int64_t digest_of_set(struct lw_obstacle a, struct lw_obstacle b)
+{
+    struct lw_world world = {0};
+    assert_int_equal(apply(&world, MINE, LW_UPSERT, a, b), LW_OK);
+    return world.digest;
+}
+
+// One bit of a centre, a radius or an id makes another digest.
+static void every_bit_of_an_obstacle_counts(void **state)
+{
+    (void)state;
+    struct lw_obstacle a = ball(1, 0.5), b = ball(2, -0.25);
+    const int64_t digest = digest_of_set(a, b);
+    struct {
+        void *field;
+        size_t size;
+    } fields[] = {{&a.id, sizeof a.id}, {a.p, sizeof a.p}, {&a.radius, sizeof a.radius},
+                  {&b.id, sizeof b.id}, {b.p, sizeof b.p}, {&b.radius, sizeof b.radius}};
+    for (size_t f = 0; f < sizeof fields / sizeof fields[0]; f++)
+        for (size_t bit = 0; bit < 8 * fields[f].size; bit++) {
+            unsigned char *byte = (unsigned char *)fields[f].field + bit / 8;
+            *byte = (unsigned char)(*byte ^ (1u << (bit % 8)));
+            if (a.id != 0 && b.id != 0 && a.id != b.id)
+                assert_int_not_equal(digest_of_set(a, b), digest);
+            *byte = (unsigned char)(*byte ^ (1u << (bit % 8)));
+        }
+    assert_int_equal(digest_of_set(a, b), digest);
+    assert_int_not_equal(digest_of_set(b, a), digest); // the law meets them in their order
+}
+
+// The digest is that of the set, however the world came to it and whoever sent it; what changes nothing keeps it.
+static void the_digest_is_that_of_the_set(void **state)
+{
+    (void)state;
+    static struct lw_world world, empty;
+    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(1, 0.1), ball(2, 0.2)), LW_OK);
+    const int64_t digest = world.digest;
+    assert_int_equal(apply(&world, YOURS, LW_UPSERT, ball(3, 0.3), none), LW_OK);
+    assert_int_not_equal(world.digest, digest);
+    assert_int_equal(apply(&world, YOURS, LW_REMOVE, ball(3, 0), none), LW_OK);
+    assert_int_equal(world.digest, digest);
+    assert_int_equal(apply(&world, YOURS, LW_REPLACE, ball(1, 0.1), none), LW_OK);
+    assert_int_equal(world.digest, digest);
+    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(2, 0.7), none), LW_OK);
+    assert_int_not_equal(world.digest, digest);
+    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(2, 0.2), none), LW_OK);
+    assert_int_equal(world.digest, digest);
+    // No obstacle, one that was heard of and one at the origin are three different things.
+    assert_int_equal(apply(&world, MINE, LW_CLEAR, none, none), LW_OK);
+    assert_int_equal(apply(&empty, MINE, LW_UPSERT, none, none), LW_OK);
+    assert_int_equal(world.digest, empty.digest);
+    assert_int_equal(empty.digest, (int64_t)lw_digest_int(LW_DIGEST_START, 0)); // the count stands first
+    assert_int_equal(apply(&empty, MINE, LW_UPSERT, (struct lw_obstacle){.id = 1}, none), LW_OK);
+    assert_int_not_equal(world.digest, empty.digest);
+}
+
+// A change that is refused leaves the digest too, and so does one that comes again.
+static void a_refused_change_keeps_the_digest(void **state)
+{
+    (void)state;
+    static struct lw_world world;
+    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(1, 0.1), none), LW_OK);
+    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(1, 0.2), none), LW_OK);
+    const int64_t digest = world.digest;
+    world.last.seq = 0;
+    assert_int_equal(apply(&world, MINE, LW_CLEAR, none, none), LW_E_OLD);
+    world.last.seq = 1;
+    assert_int_equal(apply(&world, MINE, LW_CLEAR, none, none), LW_OK);
+    assert_int_equal(world.digest, digest);
+}
+
+// --- a step ---
+
+// Each step can be undone, so nothing is lost on the way; and the digest of old logs stays what it was.
+static void a_step_can_be_undone(void **state)
+{
+    (void)state;
+    struct random random = {78};
+    for (int n = 0; n < 1000; n++) {
+        const uint64_t before = random_bits(&random), word = random_bits(&random);
+        const uint64_t after = lw_digest_word(before, word);
+        const uint64_t unfolded = after ^ (after >> 32);
+        const uint64_t inverse = UINT64_C(0xce965057aff6957b); // of 0x100000001b3, modulo 2^64
+        assert_true(((unfolded * inverse) ^ word) == before);
+    }
+    const double values[2] = {1.5, -2.25};
+    const uint64_t digest = lw_digest_doubles(lw_digest_int(LW_DIGEST_START, -7), values, 2);
+    assert_true(digest == UINT64_C(0x206d7844397f435a));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_bit_of_the_input_counts), cmocka_unit_test(equal_inputs_have_equal_digests),
+        cmocka_unit_test(the_request_in_force_counts),   cmocka_unit_test(every_bit_of_an_obstacle_counts),
+        cmocka_unit_test(the_digest_is_that_of_the_set), cmocka_unit_test(a_refused_change_keeps_the_digest),
+        cmocka_unit_test(a_step_can_be_undone),          cmocka_unit_test(a_changed_bit_is_never_lost),
+    };
+    return cmocka_run_group_tests_name("digest", tests, NULL, NULL);
+}
