@@ -87,7 +87,7 @@ void *lw_live_world(void *user)
     struct lw_live *live = user;
     int64_t due_ns = lw_clock_mono_ns();
     while (!atomic_load(&live->rt_done) && !atomic_load(&live->bus_failed)) {
-        if (!lw_bus_handle(live->world_bus, POLL_MS))
+        if (!lw_bus_handle(live->world_rx_bus, POLL_MS))
             atomic_store(&live->bus_failed, true);
         if (lw_clock_mono_ns() < due_ns || live->world.version == 0)
             continue;
@@ -107,10 +107,10 @@ enum lw_status lw_live_subscribe(struct lw_live *live)
     enum lw_status status = lw_program_subscribe(program, live->rx_bus, LW_CHANNEL_JOINT_STATE, on_joint_state, live);
     lw_program_normal_thread();
     if (status == LW_OK)
-        status = lw_program_subscribe(program, live->world_bus, LW_CHANNEL_OBSTACLES, on_obstacles, live);
+        status = lw_program_subscribe(program, live->world_rx_bus, LW_CHANNEL_OBSTACLES, on_obstacles, live);
     if (status == LW_OK)
-        status = lw_program_subscribe(program, live->world_bus, LW_CHANNEL_GOAL, on_request, live);
+        status = lw_program_subscribe(program, live->world_rx_bus, LW_CHANNEL_GOAL, on_request, live);
     if (status == LW_OK)
-        status = lw_program_subscribe(program, live->world_bus, LW_CHANNEL_STOP, on_request, live);
+        status = lw_program_subscribe(program, live->world_rx_bus, LW_CHANNEL_STOP, on_request, live);
     return status;
 }

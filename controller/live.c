@@ -92,7 +92,9 @@ static bool open_all(struct lw_live *live)
     for (size_t i = 0; i < sizeof bus / sizeof bus[0]; i++)
         if (lw_program_open(live->control->program, bus[i]) != LW_OK)
             return false;
-    return lw_program_open_stream(live->control->program, &live->rx_bus) == LW_OK && lw_live_subscribe(live) == LW_OK;
+    return lw_program_open_stream(live->control->program, &live->rx_bus) == LW_OK &&
+           lw_program_open_stream(live->control->program, &live->world_rx_bus) == LW_OK &&
+           lw_live_subscribe(live) == LW_OK;
 }
 
 int lw_control_live(struct lw_control *control)
@@ -113,6 +115,7 @@ int lw_control_live(struct lw_control *control)
     lw_health_free(&live.health);
     lw_bus_close(live.status_bus);
     lw_bus_close(live.world_bus);
+    lw_bus_close(live.world_rx_bus);
     lw_bus_close(live.rx_bus);
     lw_bus_close(live.rt_bus);
     return status;

@@ -29,7 +29,7 @@ struct lw_arrival {
 
 struct lw_live {
     struct lw_control *control;
-    struct lw_bus *rt_bus, *rx_bus, *world_bus, *status_bus;
+    struct lw_bus *rt_bus, *rx_bus, *world_rx_bus, *world_bus, *status_bus;
     struct lw_mailbox state_box;   // rx -> rt: struct lw_arrival
     struct lw_mailbox world_box;   // world -> rt: struct lw_world
     struct lw_mailbox request_box; // world -> rt: struct lw_request

@@ -14,6 +14,7 @@
 
 #include <arpa/inet.h>  // inet_pton
 #include <errno.h>      // errno
+#include <poll.h>       // poll
 #include <stddef.h>     // ptrdiff_t
 #include <stdlib.h>     // calloc, getenv
 #include <string.h>     // strerrordesc_np
@@ -119,7 +120,8 @@ void lw_bus_close(struct lw_bus *bus)
         return;
     if (bus->lcm != NULL)
         lcm_destroy(bus->lcm);
-    lw_datagram_close(&bus->datagram);
+    for (int c = 0; c < LW_CHANNEL_COUNT; c++)
+        lw_datagram_close(&bus->datagram[c]);
     free(bus);
 }
 
@@ -143,14 +145,10 @@ static void handle_raw(const lcm_recv_buf_t *buf, const char *channel, void *use
 enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler, void *user,
                                 struct lw_error *error)
 {
-    if (bus->lcm == NULL && bus->datagram.channel[0] != '\0') {
-        snprintf(error->text, sizeof error->text, "a socket of its own receives one channel");
-        return LW_E_BUS;
-    }
     struct lw_subscription *s = &bus->subscription[channel];
     *s = (struct lw_subscription){.bus = bus, .channel = channel, .handler = handler, .user = user};
     if (bus->lcm == NULL)
-        return lw_datagram_open(&bus->datagram, &bus->group, bus->channel_name[channel], RECEIVE_BYTES, error);
+        return lw_datagram_open(&bus->datagram[channel], &bus->group, bus->channel_name[channel], RECEIVE_BYTES, error);
     lcm_subscription_t *made = lcm_subscribe(bus->lcm, bus->channel_name[channel], handle_raw, s);
     if (made == NULL) {
         snprintf(error->text, sizeof error->text,
@@ -164,21 +162,42 @@ enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_
 }
 
 // One message at most: the socket itself is the queue.
-static bool handle_datagram(struct lw_bus *bus, int timeout_ms)
+static bool take(struct lw_bus *bus, enum lw_channel channel, int timeout_ms)
 {
     const void *data = NULL;
     uint32_t size = 0;
-    const int got = lw_datagram_receive(&bus->datagram, timeout_ms, &data, &size);
-    for (int c = 0; got > 0 && c < LW_CHANNEL_COUNT; c++)
-        if (bus->subscription[c].handler != NULL)
-            deliver(&bus->subscription[c], data, size);
+    const int got = lw_datagram_receive(&bus->datagram[channel], timeout_ms, &data, &size);
+    if (got > 0)
+        deliver(&bus->subscription[channel], data, size);
     return got >= 0;
+}
+
+// One message of each channel at most, so that a flood on one does not keep the others waiting.
+static bool handle_datagrams(struct lw_bus *bus, int timeout_ms)
+{
+    struct pollfd wait[LW_CHANNEL_COUNT];
+    enum lw_channel channel[LW_CHANNEL_COUNT];
+    nfds_t n = 0;
+    for (int c = 0; c < LW_CHANNEL_COUNT; c++)
+        if (bus->subscription[c].handler != NULL) {
+            wait[n] = (struct pollfd){.fd = bus->datagram[c].fd, .events = POLLIN};
+            channel[n++] = (enum lw_channel)c;
+        }
+    // A single socket waits by itself: one system call a message.
+    if (n == 1)
+        return take(bus, channel[0], timeout_ms);
+    const int ready = poll(wait, n, timeout_ms);
+    bool ok = ready >= 0 || errno == EINTR; // a signal only ends the wait
+    for (nfds_t i = 0; ready > 0 && i < n; i++)
+        if (wait[i].revents != 0)
+            ok &= take(bus, channel[i], 0);
+    return ok;
 }
 
 bool lw_bus_handle(struct lw_bus *bus, int timeout_ms)
 {
     if (bus->lcm == NULL)
-        return handle_datagram(bus, timeout_ms);
+        return handle_datagrams(bus, timeout_ms);
     int handled = lcm_handle_timeout(bus->lcm, timeout_ms);
     while (handled > 0)
         handled = lcm_handle_timeout(bus->lcm, 0);

@@ -27,7 +27,7 @@ struct lw_bus_config {
     const char *name; // robot's prefix of the channels JOINT_STATE, JOINT_COMMAND, GOAL, STOP, SCENE; NULL = none
     int64_t session;  // from lw_clock_session, one per process
     struct lw_refusals *refusals; // counts what handlers never see
-    bool own_socket; // receives one channel by bus/datagram.h in the handling thread, without LCM's threads, and
+    bool own_socket; // receives by bus/datagram.h, a socket a channel, in the handling thread, without LCM's threads;
                      // cannot publish
 };
 
@@ -40,11 +40,12 @@ void lw_bus_close(struct lw_bus *bus);
 
 // Calls handler(user, ...) from lw_bus_handle for every valid message of a channel. The first call of a bus starts
 // LCM's read thread, which inherits the caller's scheduling. Fails LW_E_BUS when the bus does not hear itself. With
-// own_socket there is no such thread, and only one channel.
+// own_socket there is no such thread.
 LW_MUST_CHECK enum lw_status lw_bus_subscribe(struct lw_bus *bus, enum lw_channel channel, lw_bus_handler handler,
                                               void *user, struct lw_error *error);
 
-// Waits up to timeout_ms for messages and hands all that came to their handlers. False when the bus failed.
+// Waits up to timeout_ms for messages and hands all that came to their handlers, with own_socket one of each channel.
+// False when the bus failed.
 bool lw_bus_handle(struct lw_bus *bus, int timeout_ms);
 
 // Stamps (session, next seq of the channel, clocks), encodes and sends a message. The stamp used is written back.

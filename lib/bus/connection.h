@@ -27,7 +27,7 @@ struct lw_subscription {
 struct lw_bus {
     lcm_t *lcm; // NULL with own_socket
     struct sockaddr_in group;
-    struct lw_datagram datagram; // with own_socket
+    struct lw_datagram datagram[LW_CHANNEL_COUNT]; // with own_socket, of the channels subscribed
     int64_t session;
     char name[LW_NAME_MAX + 2]; // prefix of channels, with its underscore
     char channel_name[LW_CHANNEL_COUNT][LW_CHANNEL_NAME_MAX];

@@ -60,7 +60,7 @@ static const struct argp_option common_options[] = {
     {"cpu", KEY_CPU, "N", 0, "Bind the real-time thread to this CPU.", 0},
     {"priority", KEY_PRIORITY, "P", 0, "SCHED_FIFO priority of the real-time thread, 2 to 98 (80).", 0},
     {"transport", KEY_TRANSPORT, "HOW", 0,
-     "Receive the other side's stream by a socket of its own in the receiving thread (own), or by LCM's threads (lcm).",
+     "Receive by a socket of its own for each channel in the thread that wants it (own), or by LCM's threads (lcm).",
      0},
     {"histogram", KEY_HISTOGRAM, "FILE", 0, "At the end, write the loop's timing as JSON, in bins of 1 us.", 0},
     {"quiet", 'q', NULL, 0, "Errors only.", 0},

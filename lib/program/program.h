@@ -58,7 +58,7 @@ void lw_program_start(struct lw_program *program, int argc, char **argv);
 void lw_program_say(const struct lw_program *program, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void lw_program_fail(const struct lw_program *program, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-// Opens a bus connection, one for the peer's real-time stream alone, or subscribes on one; says why not.
+// Opens a bus connection to publish on, one to receive on as --transport says, or subscribes on one; says why not.
 LW_MUST_CHECK enum lw_status lw_program_open(const struct lw_program *program, struct lw_bus **bus);
 LW_MUST_CHECK enum lw_status lw_program_open_stream(const struct lw_program *program, struct lw_bus **bus);
 LW_MUST_CHECK enum lw_status lw_program_subscribe(const struct lw_program *program, struct lw_bus *bus,

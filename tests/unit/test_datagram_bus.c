@@ -99,6 +99,49 @@ static void a_bus_counts_what_it_refuses(void **state)
     lw_bus_close(bus);
 }
 
+static void count_by_channel(void *user, enum lw_channel channel, const union lw_message *message)
+{
+    ((int *)user)[channel] += message->stamp.seq == 3;
+}
+
+// One bus, several channels: a flood on one, fragments and all, does not keep a message of another waiting.
+static void a_bus_hears_several_channels(void **state)
+{
+    (void)state;
+    static const unsigned char large[100000] = {0};
+    const enum lw_channel channels[] = {LW_CHANNEL_OBSTACLES, LW_CHANNEL_GOAL, LW_CHANNEL_STOP};
+    struct random random = {4};
+    struct lw_refusals refusals = {0};
+    struct lw_error error = {""};
+    struct lw_bus *bus = NULL;
+    int heard[LW_CHANNEL_COUNT] = {0};
+    const struct lw_bus_config config = {.url = URL, .session = 5, .refusals = &refusals, .own_socket = true};
+    assert_int_equal(lw_bus_open(&config, &bus, &error), LW_OK);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(lw_bus_subscribe(bus, channels[i], count_by_channel, heard, &error), LW_OK);
+    lcm_t *lcm = open_lcm();
+    assert_true(lw_bus_handle(bus, 0)); // nothing came
+    flood(lcm, 200);
+    assert_int_equal(publish(lcm, "GOAL", large, sizeof large), 0);
+    for (int i = 0; i < 3; i++) {
+        unsigned char data[LW_WIRE_MAX];
+        union lw_message sent = make(&random, channels[i]);
+        sent.stamp.seq = 3;
+        const uint32_t size = lw_wire_encode(channels[i], &sent, data);
+        assert_int_equal(publish(lcm, lw_wire_channel_name(channels[i]), data, size), 0);
+    }
+    // One message of the flood on OBSTACLES, and at once the only ones of the others.
+    assert_true(lw_bus_handle(bus, SOON));
+    assert_int_equal(lw_refusals_total(&refusals), 1);
+    assert_true(heard[LW_CHANNEL_OBSTACLES] == 0 && heard[LW_CHANNEL_GOAL] == 1 && heard[LW_CHANNEL_STOP] == 1);
+    for (int i = 0; i < 50; i++)
+        assert_true(lw_bus_handle(bus, SOON));
+    assert_int_equal(heard[LW_CHANNEL_OBSTACLES], 1);
+    assert_int_equal(lw_refusals_total(&refusals), 50);
+    lcm_destroy(lcm);
+    lw_bus_close(bus);
+}
+
 // A flood of other channels leaves no trace in a receive buffer of a few messages. Without the filter it fills it: the
 // message behind the flood is lost, which shows that the filter is what keeps it.
 static void a_flood_does_not_reach_a_small_buffer(void **state)
@@ -210,6 +253,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_the_bus_publishes_arrives),
         cmocka_unit_test(a_bus_counts_what_it_refuses),
+        cmocka_unit_test(a_bus_hears_several_channels),
         cmocka_unit_test(a_flood_does_not_reach_a_small_buffer),
         cmocka_unit_test(a_flood_does_not_slip_in_while_opening),
         cmocka_unit_test(the_port_is_shared),
