@@ -94,16 +94,21 @@ static void send(struct traffic *t, struct controller *c)
         put_under_way(t, &command, any_delay(random));
 }
 
+static bool all_finite(const double values[LW_NJ])
+{
+    bool finite = true;
+    for (int j = 0; j < LW_NJ; j++)
+        finite = finite && isfinite(values[j]);
+    return finite;
+}
+
 // Whether the reason given for a refusal is true.
 static bool is_cause(const struct traffic *t, const struct lw_joint_command *c, enum lw_verdict verdict)
 {
     const int64_t lag = t->state_seq - c->state_seq;
     const bool held = t->owner != 0 && t->now_ns - t->owner_ns < t->gate.lease_ns;
-    bool finite = true;
-    for (int j = 0; j < LW_NJ; j++)
-        finite = finite && isfinite(c->qd[j]);
     switch (verdict) {
-    case LW_REFUSED_RANGE: return !finite;
+    case LW_REFUSED_RANGE: return !all_finite(c->qd);
     case LW_REFUSED_GUARD: return t->now_ns < t->gate.open_ns;
     case LW_REFUSED_OTHER_PLANT: return c->plant_session != t->gate.plant_session;
     case LW_REFUSED_IDLE: return c->mode == LW_COMMAND_IDLE;
