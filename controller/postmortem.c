@@ -34,7 +34,7 @@ void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union 
     // The oldest makes room: what it changed stays in the world before.
     if (heard->count == LW_HEARD_MAX && slot->channel == LW_CHANNEL_OBSTACLES)
         (void)(lw_world_apply(&heard->before, &slot->message.obstacles) == LW_OK); // it was taken once already
-    *slot = (struct lw_heard_message){.channel = channel, .message = *message, .time_ns = lw_clock_mono_ns()};
+    *slot = (struct lw_heard_message){.channel = (int)channel, .message = *message, .time_ns = lw_clock_mono_ns()};
     heard->next = (heard->next + 1) % LW_HEARD_MAX;
     heard->count += heard->count < LW_HEARD_MAX;
     pthread_mutex_unlock(&heard->lock);
