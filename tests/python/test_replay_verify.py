@@ -164,6 +164,29 @@ def test_a_message_that_the_log_lacks(tmp_path: Path) -> None:
     assert c.first_unknown == 5
 
 
+def test_many_messages_before_the_first_tick(tmp_path: Path) -> None:
+    r = Recorder()
+    for seq in range(1, 40):
+        r.obstacles(7, seq, [(seq % 5 + 1, (0.6, -0.5, 0.01 * seq), 0.1)], heard=seq > 20)
+    r.tick(5)
+    result = verified(r.log, tmp_path)
+    assert (only(result).equal, result.result) == (5, "equal")
+
+
+def test_a_message_that_the_log_lacks_before_one_that_it_has(tmp_path: Path) -> None:
+    r = Recorder()
+    r.obstacles(7, 1, [(1, (0.6, -0.5, 0.5), 0.1)])
+    r.tick(4)
+    r.obstacles(7, 2, [(2, (0.5, -0.5, 0.5), 0.1)], logged=False)
+    r.obstacles(7, 3, [(1, (0.4, -0.5, 0.5), 0.1)])
+    r.tick(3)
+    r.obstacles(7, 4, [(2, (0.5, -0.5, 0.5), 0.1)])
+    r.tick(3)
+    c = only(result := verified(r.log, tmp_path))
+    assert (c.equal, result.result) == (7, "incomplete")
+    assert list(c.unknown.values()) == [3]
+
+
 def test_a_log_that_begins_in_mid_run(tmp_path: Path) -> None:
     log = usual()
     begin = places(log, "JOINT_STATE")[10]
@@ -198,7 +221,19 @@ def test_a_bit_of_a_joint_state(tmp_path: Path, byte: int) -> None:
     assert names
 
 
-def test_a_joint_state_that_no_controller_takes(tmp_path: Path) -> None:
+def test_a_value_that_no_controller_takes(tmp_path: Path) -> None:
+    log = usual()
+    layout: Any = as_rows("JOINT_STATE", b"").dtype
+    sign = 8 + layout.fields["period_ns"][1]
+    c = only(verified(flip(log, places(log, "JOINT_STATE")[20], sign, 7), tmp_path))
+    assert c.first is not None
+    assert [change.name for change in c.first.changed] == ["JOINT_STATE period_ns"]
+    # It is computed as if none had been heard, not from the state before.
+    session = next(f for f in c.first.fields if f.name == "plant_session")
+    assert session.replayed == 0
+
+
+def test_a_joint_state_of_another_layout(tmp_path: Path) -> None:
     log = usual()
     place = places(log, "JOINT_STATE")[20]
     c = only(result := verified(flip(log, place, 0), tmp_path))  # another fingerprint
@@ -221,6 +256,17 @@ def test_a_bit_of_an_obstacle(tmp_path: Path, byte: int, axis: int) -> None:
     assert f"OBSTACLES id 1: {what}" in [change.name for change in c.first.changed]
     # The next message of its sender corrects it.
     assert c.differing == 12
+
+
+def test_a_bit_of_a_repetition_that_changed_nothing(tmp_path: Path) -> None:
+    r = Recorder()
+    for seq in (1, 2, 3):
+        r.obstacles(7, seq, [(1, (0.6, -0.5, 0.5), 0.1)])
+        r.tick(4)
+    c = only(result := verified(flip(r.log, places(r.log, "OBSTACLES")[1], 60), tmp_path))
+    assert c.first is not None
+    assert (c.first.tick, c.differing, result.result) == (5, 4, "differs")
+    assert "OBSTACLES id 1: p[1]" in [change.name for change in c.first.changed]
 
 
 def test_a_bit_of_a_goal(tmp_path: Path) -> None:
@@ -278,6 +324,17 @@ def test_a_bit_of_a_command(tmp_path: Path, byte: int) -> None:
     name = field_at("JOINT_COMMAND", byte)
     told = {f.name.partition("[")[0] for f in c.first.fields}
     assert name in told | {change.name for change in c.first.changed}
+
+
+@pytest.mark.parametrize("bit", range(9))
+def test_a_flag_of_a_command(tmp_path: Path, bit: int) -> None:
+    log = usual()
+    layout: Any = as_rows("JOINT_COMMAND", b"").dtype
+    byte = 8 + layout.fields["flags"][1] + 3 - bit // 8
+    c = only(verified(flip(log, places(log, "JOINT_COMMAND")[22], byte, bit % 8), tmp_path))
+    assert c.first is not None
+    assert (c.first.tick, c.differing, c.first.right_inputs) == (23, 1, True)
+    assert [f.name for f in c.first.fields] == ["flags"]
 
 
 @pytest.mark.parametrize("byte", range(len(COMMAND) - 32, len(COMMAND)))

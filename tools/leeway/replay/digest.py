@@ -42,6 +42,7 @@ class Change(NamedTuple):
     name: str
     had: str  # by the controller
     log: str  # in the log
+    bits: int  # that differ
 
 
 def integer(name: str, value: int) -> Word:
@@ -91,7 +92,7 @@ def needed(words: Sequence[Word], wanted: int) -> list[int]:
 def changes(words: Sequence[Word], wanted: int) -> list[Change]:
     """Return the single values whose change explains a digest."""
     return [
-        Change(word.name, word.show(bits), word.show(word.bits))
+        Change(word.name, word.show(bits), word.show(word.bits), (bits ^ word.bits).bit_count())
         for word, bits in zip(words, needed(words, wanted), strict=True)
         if bits != word.bits and _is_plausible(word, bits)
     ]
@@ -157,7 +158,9 @@ WORLD_DIGEST = "digest of the obstacles"
 
 
 def explain(words: Sequence[Word], world: _native.World, recorded: int) -> list[Change]:
-    """Return the inputs in the log that are not what the controller had, as far as one alone is.
+    """Return the likeliest input in the log that is not what the controller had.
+
+    None when no single value explains the digest; several when they are equally likely.
 
     Parameters
     ----------
@@ -169,8 +172,11 @@ def explain(words: Sequence[Word], world: _native.World, recorded: int) -> list[
     recorded &= MASK
     computed = digest(words)
     if (computed ^ recorded).bit_count() == 1:
-        shown = (f"0x{value:016x}" for value in (computed, recorded))
-        return [Change("input_digest of the command", *shown)]
+        had, log = (f"0x{value:016x}" for value in (computed, recorded))
+        return [Change("input_digest of the command", had, log, 1)]
     found = changes(words, recorded)
     place = [word.name for word in words].index(WORLD_DIGEST)
-    return found + changes(world_words(world.obstacles()), needed(words, recorded)[place])
+    found += changes(world_words(world.obstacles()), needed(words, recorded)[place])
+    # A flipped top bit looks like two flipped bits of the next value.
+    least = min((change.bits for change in found), default=0)
+    return [change for change in found if change.bits == least]

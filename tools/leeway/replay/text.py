@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Iterator
 
@@ -103,4 +104,5 @@ def show_position(player: Player, now: float) -> None:
     state = "paused" if transport.paused else f"x {transport.speed:g}"
     sent = sum(player.sent.values())
     line = f"{position:7.1f} of {transport.duration:.1f} s  {state:7}  {sent} sent   {KEYS}"
-    print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
+    width = shutil.get_terminal_size().columns - 1  # a longer line would stay and begin anew
+    print(f"\r\033[K{line[:width]}", end="", file=sys.stderr, flush=True)
