@@ -162,6 +162,24 @@ def is_whole(log: Path) -> bool:
     return True
 
 
+def test_a_post_mortem_log_is_equal_but_for_its_first_tick(root: Path, tmp_path: Path) -> None:
+    scene, folder = root / "scenarios" / "c4.yaml", tmp_path / "pm"
+    listener = Listener()
+    with running("leeway-controller", scene, f"--post-mortem={folder}"):
+        with running("leeway-simulator", scene) as simulator:
+            listener.wait_for("JOINT_COMMAND", lambda c: c.mode == c.VELOCITY)
+            own = lcm.LCM(bus.resolve_url(None))
+            assert bus.send_obstacles(own, None, bus.UPSERT, [(9, (0.2, -0.9, 0.5), 0.1)])
+            listener.wait_for("JOINT_COMMAND", lambda c: c.tick > 400)
+            simulator.kill()
+        wait_until(lambda: any(folder.glob("*.lcm")), 10, "post-mortem log")
+    (log,) = folder.glob("*.lcm")
+    status, found = verify(log)
+    (c,) = found["controllers"]
+    assert (status, c["differing"], list(c["unknown"].values())) == (3, 0, [1])
+    assert c["verified"] == ticks_in(log) - 1 > 200
+
+
 # --- damage ---
 
 
