@@ -52,16 +52,36 @@ static void write_at(struct writer *w, enum lw_channel channel, const union lw_m
     lw_log_write(w->log, channel, message, time_ns / 1000 + w->utime_offset_us);
 }
 
-// The obstacles known before the messages that follow: one message for each run of obstacles of one owner.
+// Number of the newest message of an owner.
+static int64_t newest_seq(const struct lw_world *world, int64_t owner)
+{
+    for (int i = 0; i < LW_SENDERS_MAX; i++)
+        if (world->sender[i].session == owner)
+            return world->sender[i].seq;
+    return 1;
+}
+
+// Obstacles from i on that one message can carry: those of one owner that follow one another.
+static int run_length(const struct lw_world *world, int i)
+{
+    int n = 1;
+    while (n < LW_CHANGE_MAX && i + n < world->count && world->obstacle[i + n].session == world->obstacle[i].session)
+        n++;
+    return n;
+}
+
+// The obstacles known before the messages that follow, in their order; numbered so that an owner's next message is
+// newer.
 static void write_before(struct writer *w, const struct lw_world *world, int64_t time_ns)
 {
-    for (int i = 0; i < world->count;) {
-        union lw_message message = {.obstacles = {.op = LW_UPSERT}};
+    for (int i = 0; i < world->count; i += run_length(world, i)) {
+        union lw_message message = {.obstacles = {.op = LW_UPSERT, .count = run_length(world, i)}};
         struct lw_obstacle_change *change = &message.obstacles;
-        const int64_t owner = world->obstacle[i].session;
-        change->stamp = (struct lw_stamp){.session = owner, .seq = 1 + i};
-        while (i < world->count && world->obstacle[i].session == owner && change->count < LW_CHANGE_MAX)
-            change->obstacle[change->count++] = world->obstacle[i++];
+        change->stamp.session = world->obstacle[i].session;
+        change->stamp.seq = newest_seq(world, change->stamp.session);
+        for (int k = i + change->count; k < world->count; k += run_length(world, k))
+            change->stamp.seq -= world->obstacle[k].session == change->stamp.session;
+        memcpy(change->obstacle, &world->obstacle[i], (size_t)change->count * sizeof change->obstacle[0]);
         write_at(w, LW_CHANNEL_OBSTACLES, &message, time_ns);
     }
 }

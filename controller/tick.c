@@ -27,6 +27,7 @@ enum lw_status lw_controller_init(struct lw_controller *config, struct lw_contro
     const int64_t period_ns = lw_scene_period_ns(scene->rate_hz);
     const int64_t patience_ns = STALE_PERIODS * period_ns;
     *config = (struct lw_controller){.session = session,
+                                     .scene_digest = lw_scene_digest(scene),
                                      .arm = lw_arm_get((enum lw_robot)scene->robot),
                                      .law = lw_law_get((enum lw_law_name)scene->law.name),
                                      .params = scene->law,
@@ -119,7 +120,8 @@ static enum lw_law_outcome ask_law(const struct lw_controller *config, const str
 
 // Digest of all that the tick was given, so that a replay can tell that it was given the same.
 // tools/leeway/replay/digest.py names these values in this order.
-static int64_t digest_input(const struct lw_controller_state *state, const struct lw_tick_input *in)
+static int64_t digest_input(const struct lw_controller *config, const struct lw_controller_state *state,
+                            const struct lw_tick_input *in)
 {
     const struct lw_joint_state *joint = in->joint;
     const struct lw_request *request = &state->request;
@@ -129,7 +131,7 @@ static int64_t digest_input(const struct lw_controller_state *state, const struc
         joint->period_ns,     in->world->last.session, in->world->last.seq,    in->world->version,
         in->world->digest,    request->stamp.session,  request->stamp.seq,     (int64_t)request->kind,
         in->time_ns,          in->state_age_ns,        (int64_t)in->warming_up};
-    uint64_t digest = LW_DIGEST_START;
+    uint64_t digest = lw_digest_int(LW_DIGEST_START, config->scene_digest);
     for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
         digest = lw_digest_int(digest, words[i]);
     digest = lw_digest_doubles(digest, joint->q, LW_NJ);
@@ -158,7 +160,6 @@ static void explain(const struct lw_controller_state *state, const struct lw_tic
     out->tick = state->tick;
     out->tick_ns = in->time_ns;
     out->state_age_ns = in->state_age_ns;
-    out->input_digest = digest_input(state, in);
 }
 
 void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
@@ -183,6 +184,7 @@ void lw_tick(const struct lw_controller *config, struct lw_controller_state *sta
     memcpy(state->velocity, out->qd, sizeof state->velocity);
 
     explain(state, in, frame[LW_NJ - 1].p, &law, out);
+    out->input_digest = digest_input(config, state, in);
 }
 
 bool lw_controller_at_rest(const struct lw_controller_state *state)

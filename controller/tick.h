@@ -19,7 +19,8 @@
 
 // Constant for the life of a run.
 struct lw_controller {
-    int64_t session; // this controller's, on the wire; 0 = none but this one
+    int64_t session;      // this controller's, on the wire
+    int64_t scene_digest; // of the whole scene
     const struct lw_arm *arm;
     const struct lw_law *law;
     struct lw_law_params params;

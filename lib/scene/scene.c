@@ -6,8 +6,10 @@
 // Arrays   see scene.h.
 // Memory   the file's text is freed before return.
 // Errors   see scene.h.
-#define _GNU_SOURCE // strerrordesc_np
+#define _GNU_SOURCE // strerrordesc_np, open_memstream
 #include "scene/scene.h"
+
+#include "base/digest.h" // lw_digest_word
 
 #include <errno.h>  // errno
 #include <math.h>   // round, llround
@@ -163,6 +165,22 @@ enum lw_status lw_scene_load(const char *path, const char *const *set, int set_c
 void lw_scene_write(const struct lw_scene *scene, FILE *to)
 {
     lw_schema_write(lw_scene_keys(), scene, to);
+}
+
+int64_t lw_scene_digest(const struct lw_scene *scene)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *to = open_memstream(&text, &size);
+    if (to == NULL)
+        return 0;
+    lw_scene_write(scene, to);
+    uint64_t digest = LW_DIGEST_START;
+    if (fclose(to) == 0)
+        for (size_t i = 0; i < size; i++)
+            digest = lw_digest_word(digest, (unsigned char)text[i]);
+    free(text);
+    return (int64_t)digest;
 }
 
 void lw_scene_describe(FILE *to)

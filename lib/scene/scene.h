@@ -85,6 +85,9 @@ LW_MUST_CHECK enum lw_status lw_scene_load(const char *path, const char *const *
 // Writes the whole scene as YAML, every key, exact to the last bit.
 void lw_scene_write(const struct lw_scene *scene, FILE *to);
 
+// Digest of everything a scene says (of what lw_scene_write writes); 0 when there is no memory. Uses the heap.
+int64_t lw_scene_digest(const struct lw_scene *scene);
+
 // Writes the reference of all keys.
 void lw_scene_describe(FILE *to);
 

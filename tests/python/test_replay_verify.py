@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from log_maker import event
-from replay_maker import CONTROLLER, Messages, Recorder, places, usual, write
+from log_maker import event, scene
+from replay_maker import CONTROLLER, SCENE, Messages, Recorder, places, usual, write
 
 from leeway import _native
 from leeway.logs.log import as_rows, read_tables
@@ -286,19 +286,32 @@ def test_a_goal_that_is_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "tick"),
-    [("rho_rep: 1.9", "rho_rep: 1.8", 5), ("-0.6, 0.5]", "-0.6, 0.6]", 1)],
+    ("old", "new"),
+    [
+        ("rho_rep: 1.9", "rho_rep: 1.8"),
+        ("-0.6, 0.5]", "-0.6, 0.6]"),
+        ("rho_rep: 1.9", "rho_rep: 1.90"),  # the same value
+        ("duration_s: 2", "duration_s: 3"),  # moves nothing
+    ],
 )
-def test_another_scene(tmp_path: Path, old: str, new: str, tick: int) -> None:
+def test_another_scene(tmp_path: Path, old: str, new: str) -> None:
     log = usual()
-    log[0] = ("SCENE", log[0][1].replace(old.encode(), new.encode()))
+    assert old in SCENE
+    text, changed = (
+        _native.read_scene(one, "scene", []).to_yaml() for one in (SCENE, SCENE.replace(old, new))
+    )
+    other = scene(CONTROLLER, yaml=SCENE.replace(old, new), build=_native.BUILD)
+    log[0] = ("SCENE", other.encode())
     c = only(result := verified(log, tmp_path))
+    if text == changed:
+        assert result.result == "equal"
+        return
+    assert result.result == "differs"
     assert c.first is not None
-    assert (c.first.tick, result.result) == (tick, "differs")
-    if tick == 1:
-        assert [change.name for change in c.first.changed] == ["scene request.goal[2]"]
-    else:
-        assert c.first.right_inputs
+    assert (c.first.tick, c.differing) == (1, TICKS)
+    # A goal of the scene is in two values of the digest, its own and the scene's.
+    explained = ["SCENE"] if "0.6" not in old else []
+    assert [change.name for change in c.first.changed] == explained
 
 
 def test_one_scene_message_that_says_something_else(tmp_path: Path) -> None:
@@ -383,7 +396,8 @@ def test_the_digest_is_that_of_the_tick(tmp_path: Path) -> None:
         assert outcome.inputs is not None
         state = replay.states.rows[outcome.inputs.state] if outcome.inputs.state >= 0 else None
         command = replay.commands.rows[outcome.row]
-        words = input_words(state, outcome.inputs.guess.world, command, outcome.inputs.warming_up)
+        world, warming_up = outcome.inputs.guess.world, outcome.inputs.warming_up
+        words = input_words(replay.scene_digest, state, world, command, warming_up)
         assert digest(words) == int(command["input_digest"]) & (1 << 64) - 1
         count += 1
     assert count == TICKS

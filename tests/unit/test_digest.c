@@ -91,6 +91,21 @@ static void every_bit_of_the_input_counts(void **state)
 }
 
 // The same input has the same digest wherever it stands in memory and whatever the controller did before.
+// A value of the scene counts even where it moves nothing.
+static void the_scene_counts(void **state)
+{
+    (void)state;
+    struct rig *rig = start();
+    struct input *input = make_input(rig);
+    const int64_t digest = digest_of(rig, input);
+    struct lw_scene scene = rig->scene;
+    scene.duration_s = nextafter(scene.duration_s, HUGE_VAL);
+    assert_int_equal(lw_controller_init(&rig->config, &rig->state, &scene, rig->config.session), LW_OK);
+    assert_int_not_equal(digest_of(rig, input), digest);
+    assert_int_equal(lw_controller_init(&rig->config, &rig->state, &rig->scene, rig->config.session), LW_OK);
+    assert_int_equal(digest_of(rig, input), digest);
+}
+
 static void equal_inputs_have_equal_digests(void **state)
 {
     (void)state;
@@ -259,10 +274,15 @@ static void a_step_can_be_undone(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_bit_of_the_input_counts), cmocka_unit_test(equal_inputs_have_equal_digests),
-        cmocka_unit_test(the_request_in_force_counts),   cmocka_unit_test(every_bit_of_an_obstacle_counts),
-        cmocka_unit_test(the_digest_is_that_of_the_set), cmocka_unit_test(a_refused_change_keeps_the_digest),
-        cmocka_unit_test(a_step_can_be_undone),          cmocka_unit_test(a_changed_bit_is_never_lost),
+        cmocka_unit_test(the_scene_counts),
+        cmocka_unit_test(every_bit_of_the_input_counts),
+        cmocka_unit_test(equal_inputs_have_equal_digests),
+        cmocka_unit_test(the_request_in_force_counts),
+        cmocka_unit_test(every_bit_of_an_obstacle_counts),
+        cmocka_unit_test(the_digest_is_that_of_the_set),
+        cmocka_unit_test(a_refused_change_keeps_the_digest),
+        cmocka_unit_test(a_step_can_be_undone),
+        cmocka_unit_test(a_changed_bit_is_never_lost),
     };
     return cmocka_run_group_tests_name("digest", tests, NULL, NULL);
 }

@@ -178,6 +178,8 @@ void bind_replay(nb::module_ &m)
              nb::arg("goal"), "Sets the request in force to that of a recorded command.")
         .def_prop_ro("in_force", &Controller::in_force,
                      "Request in force: whether a stop, session, seq; 0 = the scene's.")
+        .def_prop_ro(
+            "scene_digest", [](const Controller &c) { return c.config.scene_digest; }, "Digest of the scene.")
         .def_prop_ro("ticks", [](const Controller &c) { return c.state.tick; }, "Ticks so far.");
     m.attr("SHUTDOWN") = lw_request_shutdown.stamp.session;
 }

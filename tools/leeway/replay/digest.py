@@ -98,6 +98,14 @@ def changes(words: Sequence[Word], wanted: int) -> list[Change]:
     ]
 
 
+def scene_change(words: Sequence[Word], wanted: int) -> list[Change]:
+    """Return the digest of the scene that, alone, would explain a digest; no other tells more."""
+    had = needed(words, wanted & MASK)[0]
+    bits = words[0].bits
+    text = [f"digest 0x{value:016x}" for value in (had, bits)]
+    return [Change("SCENE", text[0], text[1], (had ^ bits).bit_count())]
+
+
 def _is_plausible(word: Word, bits: int) -> bool:
     """Whether a value was meant: hardly any of 2^64 is."""
     difference = bits ^ word.bits
@@ -124,11 +132,15 @@ def world_words(obstacles: list[Any]) -> list[Word]:
     return words
 
 
-def input_words(state: Any, world: _native.World, command: Any, warming_up: bool) -> list[Word]:
+def input_words(
+    scene_digest: int, state: Any, world: _native.World, command: Any, warming_up: bool
+) -> list[Word]:
     """Return the values that a tick was given.
 
     Parameters
     ----------
+    scene_digest
+        Of the scene that the controller ran.
     state
         Row of JOINT_STATE, None before the first was heard.
     command
@@ -138,7 +150,8 @@ def input_words(state: Any, world: _native.World, command: Any, warming_up: bool
     joint = ("plant_mode", "command_session", "command_seq", "tick", "period_ns")
     names = [*stamp, *joint]
     values = [state["h"][n] for n in stamp] + [state[n] for n in joint] if state else [0] * 9
-    words = [integer(f"JOINT_STATE {n}", int(v)) for n, v in zip(names, values, strict=True)]
+    words = [integer("digest of the scene", scene_digest)]
+    words += [integer(f"JOINT_STATE {n}", int(v)) for n, v in zip(names, values, strict=True)]
     echo = zip(("session", "seq", "version"), world.echo, strict=True)
     words += [integer(f"world {name}", value) for name, value in echo]
     words.append(integer(WORLD_DIGEST, world.digest))

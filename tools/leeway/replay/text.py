@@ -61,7 +61,10 @@ def _difference_lines(d: Difference) -> Iterator[str]:
     for change in d.changed:
         yield f"      {change.name}: the controller had {change.had}, the log has {change.log}"
     if not d.changed:
-        likely = " or ".join(d.suspects) or "a value of JOINT_STATE or OBSTACLES without an echo"
+        likely = (
+            " or ".join(d.suspects)
+            or "the scene, or a value of JOINT_STATE or OBSTACLES without an echo"
+        )
         yield f"      no single value explains it; by the fields that differ: {likely}"
 
 

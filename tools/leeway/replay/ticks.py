@@ -144,6 +144,7 @@ class Replay:
         self.rows = np.flatnonzero(self.commands.rows["h"]["session"] == session)
         self.line = WorldLine(log.tables["OBSTACLES"])
         self._controller = _native.Controller(self.scene, session)
+        self.scene_digest = self._controller.scene_digest
         self._spans = spans(self.commands.rows.dtype)
         self._state_rows = _find_states(self.states, self.commands, self.rows)
         self._requests = _requests(log)

@@ -12,7 +12,7 @@ import numpy as np
 
 from leeway import _native
 from leeway.logs.log import Tables, as_rows
-from leeway.replay.digest import Change, explain, input_words
+from leeway.replay.digest import Change, explain, input_words, scene_change
 from leeway.replay.ticks import FILLED_BY_PROCESS, Outcome, Replay, Verdict
 
 PROGRESS_TICKS = 2048
@@ -53,6 +53,7 @@ class Difference:
     right_inputs: bool  # the inputs in the log are those that the controller had
     changed: list[Change]  # inputs that are not, where one alone explains it
     suspects: list[str]  # else the messages that echoes point at
+    scene: list[Change]  # the scene as the cause: so if it is the same in other ticks
 
 
 @dataclass
@@ -98,6 +99,7 @@ class ControllerResult:
             first = vars(self.first) | {
                 "fields": [vars(f) for f in self.first.fields],
                 "changed": [c._asdict() for c in self.first.changed],
+                "scene": [c._asdict() for c in self.first.scene],
             }
         return own | {
             "differing": self.differing,
@@ -198,6 +200,10 @@ def _note(replay: Replay, result: ControllerResult, outcome: Outcome) -> None:
         result.fields.update({f.name.partition("[")[0] for f in difference.fields})
         result.inputs_changed += not difference.right_inputs
         result.first = result.first or difference
+        # Another scene explains every tick by the same value.
+        first = result.first
+        if first is not difference and not first.changed and first.scene == difference.scene:
+            first.changed.extend(first.scene)
 
 
 def _tick(replay: Replay, outcome: Outcome) -> int:
@@ -211,14 +217,16 @@ def describe(replay: Replay, outcome: Outcome) -> Difference:
     fields = compare_fields(recorded, replayed)
     changed: list[Change] = []
     suspects: list[str] = []
+    scene: list[Change] = []
     inputs = outcome.inputs
     state = None
     if inputs is not None and inputs.state >= 0:
         state = replay.states.rows[inputs.state]
     if inputs is not None and not outcome.right_inputs:
         world = inputs.guess.world
-        words = input_words(state, world, replayed, inputs.warming_up)
+        words = input_words(replay.scene_digest, state, world, replayed, inputs.warming_up)
         changed = explain(words, world, int(recorded["input_digest"]))
+        scene = scene_change(words, int(recorded["input_digest"]))
         names = {f.name.partition("[")[0] for f in fields}
         suspects = [] if changed else [m for m, echoed in ECHOED.items() if echoed & names]
     t = float(state["tick"]) * float(state["period_ns"]) * 1e-9 if state is not None else 0.0
@@ -230,6 +238,7 @@ def describe(replay: Replay, outcome: Outcome) -> Difference:
         right_inputs=outcome.right_inputs,
         changed=changed,
         suspects=suspects,
+        scene=scene,
     )
 
 
