@@ -244,6 +244,18 @@ def test_newest_sessions_that_moved_are_taken_and_others_told(tmp_path: Path) ->
     assert times[0] < 0 < times[2]
 
 
+def test_a_crowd_of_sessions_is_told_in_one_line(tmp_path: Path) -> None:
+    run = Run()
+    strangers = [Run(ticks=6).states[3] for _ in range(500)]
+    for session, state in enumerate(strangers, start=1000):
+        state.h.session = session
+    run.inserted[3] = [("JOINT_STATE", m) for m in strangers]
+    told = texts(analysed(run, tmp_path), "restart")
+    assert len(told) == 11
+    assert "another plant, session 1009, 1 messages" in told[-2]
+    assert "490 more plants, 490 messages" in told[-1]
+
+
 def test_ceasing_commands_and_stale_states_are_told(tmp_path: Path) -> None:
     run = Run()
     for state in run.states[20:25]:

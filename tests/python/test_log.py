@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from leeway_lcm import leeway as wire
 from log_maker import CONTROLLER, PLANT, Run, event, obstacles, scene, stamp
 
-from leeway.logs.log import Log, LogError, read_log
+from leeway.logs.log import Log, LogError, read_log, read_tables
 
 WHOLE = Run(ticks=3)
 FRAME = 28  # bytes of an event's header
@@ -42,6 +42,7 @@ def test_columns_hold_every_field_of_the_wire(tmp_path: Path) -> None:
             name,
             [number + i / 8 for i in range(len(old))] if isinstance(old, list) else number,
         )
+    command.mode = command.VELOCITY  # the only field with few values
     log = read_bytes(tmp_path, WHOLE.data() + event("JOINT_COMMAND", command.encode()))
     row = log.commands.take(np.array([len(log.commands) - 1]))
     assert (row.session[0], row.seq[0], row.mono_ns[0], row.utime[0]) == (5, 6, 7, 7)
@@ -91,6 +92,23 @@ def test_foreign_and_undecodable_messages_are_counted(tmp_path: Path) -> None:
     )
     assert len(log.states) == 3
     assert len(log.scenes) == 2
+
+
+def test_messages_that_programs_refuse_are_no_part_of_the_log(tmp_path: Path) -> None:
+    run = Run(ticks=6)
+    bad = [Run(ticks=6).states[3] for _ in range(3)]
+    bad[0].q = [np.nan, 0, 0, 0, 0, 0]
+    bad[1].period_ns = -1
+    bad[2].h.session = 0
+    command = Run(ticks=6).commands[3]
+    command.qd = [np.inf, 0, 0, 0, 0, 0]
+    run.inserted[3] = [("JOINT_STATE", m) for m in bad] + [("JOINT_COMMAND", command)]
+    log = read_bytes(tmp_path, run.data("A_"))
+    assert log.undecodable == {"A_JOINT_STATE": 3, "A_JOINT_COMMAND": 1}
+    assert log.states.seq.tolist() == [1, 2, 3, 4, 5, 6]
+    assert log.commands.order.tolist() == [4, 6, 8, 14, 16, 18]
+    # Replay looks at damaged messages too, and counts them itself.
+    assert read_tables(tmp_path / "x.lcm").undecodable == {}
 
 
 def test_cut_log_is_read_to_its_last_whole_event(tmp_path: Path) -> None:

@@ -12,12 +12,14 @@
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
 
 #include <algorithm> // copy
 #include <array>
 #include <cstdint>   // int64_t
 #include <optional>  // optional
 #include <stdexcept> // invalid_argument
+#include <string>    // string
 
 extern "C" {
 #include "bus/wire.h"        // lw_wire_*
@@ -33,6 +35,25 @@ namespace
 bool decode(lw_channel channel, const nb::bytes &data, lw_message &message)
 {
     return lw_wire_decode(channel, data.data(), static_cast<uint32_t>(data.size()), &message) == LW_OK;
+}
+
+// For each of the messages of a channel, one behind the other: 1 = a program would take it, 0 = refuse it.
+nb::bytes acceptable(const std::string &channel, const nb::bytes &messages)
+{
+    int number = 0;
+    while (number < LW_CHANNEL_COUNT && channel != lw_wire_channel_name(static_cast<lw_channel>(number)))
+        number++;
+    if (number == LW_CHANNEL_COUNT)
+        throw std::invalid_argument("no channel " + channel);
+    const auto known = static_cast<lw_channel>(number);
+    const uint32_t size = lw_wire_size(known);
+    std::string verdicts(messages.size() / size, '\0');
+    for (size_t i = 0; i < verdicts.size(); i++) {
+        lw_message message;
+        const auto *data = static_cast<const char *>(messages.data()) + i * size;
+        verdicts[i] = lw_wire_decode(known, data, size, &message) == LW_OK ? 1 : 0;
+    }
+    return nb::bytes(verdicts.data(), verdicts.size());
 }
 
 struct World {
@@ -181,5 +202,7 @@ void bind_replay(nb::module_ &m)
         .def_prop_ro(
             "scene_digest", [](const Controller &c) { return c.config.scene_digest; }, "Digest of the scene.")
         .def_prop_ro("ticks", [](const Controller &c) { return c.state.tick; }, "Ticks so far.");
+    m.def("acceptable", &acceptable, nb::arg("channel"), nb::arg("messages"),
+          "For each message of a channel, one behind the other: 1 = a program would take it, 0 = refuse it.");
     m.attr("SHUTDOWN") = lw_request_shutdown.stamp.session;
 }

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from leeway.logs.log import Floats, Log, Messages
-from leeway.logs.motion import MOVING, STOPPING, Motion, sessions_of
+from leeway.logs.motion import MOVING, STOPPING, Motion
 from leeway.logs.world import Obstacle, World, WorldLine
 
 STOPPED, STALE, NOT_FINITE = 8, 16, 32
+_OTHERS_SHOWN = 10  # other sessions of controllers or of plants that are events of their own
 MERGE_S = 0.5  # moves of an obstacle that follow one another this closely are one event
 
 
@@ -193,11 +194,15 @@ def _restarts(log: Log, motion: Motion) -> Iterator[Event]:
         ("controller", log.commands, motion.controller),
         ("plant", log.states, motion.plant),
     ):
-        for session in sessions_of(messages):
-            if session != chosen:
-                mono = messages.mono_ns[messages.session == session]
-                text = f"another {what}, session {session}, {len(mono)} messages: not counted here"
-                yield Event(motion.time_of(int(mono.min())), "restart", text)
+        others = messages.take(messages.session != chosen)
+        sessions, first, counts = np.unique(others.session, return_index=True, return_counts=True)
+        order = np.argsort(first)
+        for k in order[:_OTHERS_SHOWN]:
+            text = f"another {what}, session {sessions[k]}, {counts[k]} messages: not counted here"
+            yield Event(motion.time_of(int(others.mono_ns[first[k]])), "restart", text)
+        if left := order[_OTHERS_SHOWN:].tolist():
+            text = f"{len(left)} more {what}s, {counts[left].sum()} messages: not counted here"
+            yield Event(motion.time_of(int(others.mono_ns[first[left[0]]])), "restart", text)
 
 
 def _ending(motion: Motion, duration: float) -> Iterator[Event]:

@@ -19,6 +19,7 @@ import numpy as np
 from leeway_lcm import leeway as _generated
 from numpy.typing import NDArray
 
+from leeway import _native
 from leeway.logs.framing import LogError as LogError  # callers of this module catch it
 from leeway.logs.framing import open_events
 
@@ -187,7 +188,7 @@ class Log:
     robot: str  # prefix of its channels, "" = none
     truncated: int  # bytes behind the last whole event
     counts: dict[str, int]  # whole events per channel, foreign ones too
-    undecodable: dict[str, int]  # of those, messages of another layout, per channel
+    undecodable: dict[str, int]  # of those, messages that programs refuse, per channel
     scenes: list[SceneMessage]
     states: States
     commands: Commands
@@ -201,7 +202,8 @@ def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
 
     Streams the file; memory is about the size of the messages. A log that was cut in mid-event
     is read up to its last whole event, and `Log.truncated` counts the bytes behind it. Foreign
-    channels and messages of another layout are skipped and counted.
+    channels are skipped and counted, and so are messages that the programs themselves refuse: of
+    another layout, or with values out of range.
 
     Parameters
     ----------
@@ -216,13 +218,18 @@ def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
         The file cannot be read, is no LCM log, or holds no joint state of that robot.
     """
     tables = read_tables(path, name)
-    by_name = tables.tables
+    by_name = {channel: _taken(channel, table) for channel, table in tables.tables.items()}
+    refused = {
+        _channel(tables.robot, channel): len(table) - len(by_name[channel])
+        for channel, table in tables.tables.items()
+        if len(by_name[channel]) < len(table)
+    }
     return Log(
         path=tables.path,
         robot=tables.robot,
         truncated=tables.truncated,
         counts=tables.counts,
-        undecodable=tables.undecodable,
+        undecodable=dict(Counter(tables.undecodable) + Counter(refused)),
         scenes=tables.scenes,
         states=_columns(by_name["JOINT_STATE"], States),
         commands=_columns(by_name["JOINT_COMMAND"], Commands),
@@ -354,6 +361,15 @@ def _table(name: str, order: list[int], messages: list[bytes]) -> Table:
     fits = [k for k, data in enumerate(messages) if _fits(name, data)]
     data = b"".join(messages[k] for k in fits)
     return Table(np.array([order[k] for k in fits], dtype=np.int64), data, as_rows(name, data))
+
+
+def _taken(name: str, table: Table) -> Table:
+    """Return the messages of a table that a program would take, by the programs' own checks."""
+    verdicts = np.frombuffer(_native.acceptable(name, table.data), dtype=np.bool_)
+    if verdicts.all():
+        return table
+    data = b"".join(table.message(k) for k, taken in enumerate(verdicts) if taken)
+    return Table(table.order[verdicts], data, as_rows(name, data))
 
 
 def as_rows(name: str, data: bytes) -> NDArray[np.void]:

@@ -94,7 +94,9 @@ def sessions_of(messages: Messages) -> list[int]:
 
 def _sessions(log: Log) -> tuple[int, int]:
     """Return the newest plant session that moved and the newest controller that moved it."""
-    for plant in reversed(sessions_of(log.states)):
+    meant = np.unique(log.commands.plant_session)
+    known = log.states.take(np.isin(log.states.session, meant))
+    for plant in reversed(sessions_of(known)):
         states = log.states.take((log.states.session == plant) & (log.states.plant_mode != HOLD))
         obeyed = log.commands.take(
             (log.commands.plant_session == plant)
