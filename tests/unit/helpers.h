@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the unit tests share: cmocka with the headers it needs, seeded random numbers, comparison of doubles.
+// What the unit tests share: cmocka with the headers it needs, comparison of doubles, and random numbers.
 //
 // Units    of the caller.
 // Frames   of the caller.
@@ -8,6 +8,8 @@
 // Errors   a failed comparison prints both values and fails the test at the caller's line.
 #ifndef LW_TESTS_HELPERS_H
 #define LW_TESTS_HELPERS_H
+
+#include "random.h" // struct random
 
 #include <math.h>    // fabs
 #include <setjmp.h>  // cmocka.h needs these four before it
@@ -20,38 +22,6 @@
 #include <string.h>  // memcmp
 
 #include <cmocka.h> // assert_*
-
-// --- random numbers: xorshift64*, the same sequence in every run ---
-
-struct random {
-    uint64_t state; // not 0
-};
-
-static inline uint64_t random_bits(struct random *random)
-{
-    random->state ^= random->state >> 12;
-    random->state ^= random->state << 25;
-    random->state ^= random->state >> 27;
-    return random->state * UINT64_C(2685821657736338717);
-}
-
-// Uniform in [low, high).
-static inline double random_in(struct random *random, double low, double high)
-{
-    return low + (high - low) * ((double)(random_bits(random) >> 11) * 0x1p-53);
-}
-
-// Uniform in 0 .. count - 1.
-static inline int random_below(struct random *random, int count)
-{
-    return (int)(random_bits(random) >> 33) % count;
-}
-
-static inline void random_fill(struct random *random, double low, double high, double *values, int n)
-{
-    for (int i = 0; i < n; i++)
-        values[i] = random_in(random, low, high);
-}
 
 // --- comparison ---
 
