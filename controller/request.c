@@ -8,7 +8,8 @@
 // Errors   none.
 #include "controller/request.h"
 
-const struct lw_request lw_request_shutdown = {.stamp = {.session = INT64_MAX, .seq = 1}, .kind = LW_REQUEST_STOP};
+// No message comes from such a session (bus/wire.c), so nobody can make it look like one obeyed before.
+const struct lw_request lw_request_shutdown = {.stamp = {.session = -1, .seq = 1}, .kind = LW_REQUEST_STOP};
 
 bool lw_request_is_new(struct lw_request_memory *memory, const struct lw_request *request)
 {

@@ -26,7 +26,7 @@ struct lw_request_memory {
     int next; // place of the next new sender: the oldest makes room
 };
 
-// The request to stop that a program makes of itself when it is to end.
+// The request to stop that a program makes of itself when it is to end. Its session is below 0: no message has it.
 extern const struct lw_request lw_request_shutdown;
 
 // Whether a request is new; then it is remembered. Session 0 is no request. Cost: fixed.

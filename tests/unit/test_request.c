@@ -70,12 +70,24 @@ static void the_oldest_sender_makes_room(void **state)
     assert_true(ask(&memory, LW_REQUEST_GOAL, 1, 1));
 }
 
+// Whatever a sender may say, the program's own end is not taken for something obeyed before.
+static void no_sender_keeps_a_program_from_its_end(void **state)
+{
+    (void)state;
+    struct lw_request_memory memory = {0};
+    const int64_t extremes[] = {1, 2, INT64_MAX - 1, INT64_MAX}; // the wire refuses sessions below 1
+    for (size_t i = 0; i < sizeof extremes / sizeof extremes[0]; i++)
+        (void)ask(&memory, LW_REQUEST_STOP, extremes[i], INT64_MAX);
+    assert_true(lw_request_is_new(&memory, &lw_request_shutdown));
+    assert_false(lw_request_is_new(&memory, &lw_request_shutdown));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_request_is_never_new),      cmocka_unit_test(a_sender_counts_up),
         cmocka_unit_test(kinds_are_counted_apart),      cmocka_unit_test(a_repetition_undoes_nobodys_request),
-        cmocka_unit_test(the_oldest_sender_makes_room),
+        cmocka_unit_test(the_oldest_sender_makes_room), cmocka_unit_test(no_sender_keeps_a_program_from_its_end),
     };
     return cmocka_run_group_tests_name("request", tests, NULL, NULL);
 }
