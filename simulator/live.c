@@ -39,7 +39,7 @@ struct live {
     struct lw_health health;       // rt -> main
     struct lw_gate gate;           // rx
     struct lw_lease lease;         // rx
-    atomic_int_fast64_t state_seq; // rt -> rx: newest state published
+    atomic_int_fast64_t state_seq; // rt -> rx: newest state published, or just being published
     atomic_bool stopping;          // main -> rt: ramp to rest, then end
     atomic_bool rt_done;           // rt -> all
     atomic_bool bus_failed;        // rx -> main
@@ -102,8 +102,9 @@ static void publish(struct loop *loop)
 {
     struct live *live = loop->live;
     struct lw_record *record = &loop->record;
+    // Counted first: the answer may be here before this thread returns from sending.
+    atomic_fetch_add(&live->state_seq, 1);
     record->sent = lw_simulation_publish_state(live->simulation, live->rt_bus, &record->state) == LW_OK;
-    atomic_store(&live->state_seq, record->state.stamp.seq);
     record->skipped = loop->periodic.skipped;
     record->faults = record->state.mode == LW_PLANT_STOPPING ? LW_FAULT_PEER_TIMEOUT : 0;
     record->exec_ns = lw_clock_mono_ns() - record->time_ns;

@@ -1,0 +1,77 @@
+"""The live programs at their edges: prompt answers, slow rates, short faults, endings."""
+
+import os
+import signal
+import subprocess
+
+import pytest
+from helpers import Listener, running
+from leeway_lcm import leeway as wire
+
+from leeway.bus import header
+from leeway.processes import program
+
+pytestmark = pytest.mark.usefixtures("private_network")
+INT64_MAX = (1 << 63) - 1
+ON_ONE_CPU = ("taskset", "-c", str(min(os.sched_getaffinity(0))))
+
+
+def _command(state, session, seq):
+    """Return a command for a state that asks for no motion."""
+    command = wire.joint_command_t()
+    command.h = header(session, seq)
+    command.plant_session, command.state_seq = state.h.session, state.h.seq
+    command.state_tick, command.mode = state.tick, command.VELOCITY
+    return command.encode()
+
+
+def _moving(state):
+    return state.tick > 10 and max(map(abs, state.qd)) > 0.05
+
+
+def test_an_answer_is_never_too_early(root):
+    # On one CPU, without priorities, the answer often comes before the plant is back from sending.
+    scene = root / "scenarios" / "reach.yaml"
+    options = ("-q", "--rt=off", "--set=rate_hz=1000", "--set=plant.timeout_s=2")
+    command = [*ON_ONE_CPU, program("leeway-simulator"), scene, *options]
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    simulator = subprocess.Popen([str(c) for c in command])
+    try:
+        listener = Listener()
+        answered = 0
+
+        def answer(_, data):
+            nonlocal answered
+            answered += 1
+            listener.bus.publish(
+                "JOINT_COMMAND", _command(wire.joint_state_t.decode(data), 7, answered)
+            )
+
+        listener.bus.subscribe("JOINT_STATE", answer)
+        status = listener.wait_for("PLANT_STATUS", lambda s: s.taken > 1500, seconds=20)
+        assert status.refused[status.STALE] == 0
+    finally:
+        os.sched_setaffinity(0, before)
+        simulator.terminate()
+        simulator.wait(5)
+
+
+def test_no_message_keeps_the_controller_from_its_end(root):
+    scene = root / "scenarios" / "reach.yaml"
+    with (
+        running("leeway-simulator", scene),
+        running("leeway-controller", scene, "--post-mortem=none") as controller,
+    ):
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", _moving)
+        stop, goal = wire.stop_t(), wire.goal_t()
+        stop.h, goal.h, goal.p = header(INT64_MAX, INT64_MAX), header(5, 1), [0.2, -0.6, 0.4]
+        listener.bus.publish("STOP", stop.encode())
+        listener.wait_for("JOINT_COMMAND", lambda c: c.request_session == INT64_MAX)
+        listener.bus.publish("GOAL", goal.encode())
+        listener.wait_for("JOINT_COMMAND", lambda c: c.request_session == 5)
+        listener.wait_for("JOINT_STATE", _moving)
+        controller.send_signal(signal.SIGTERM)
+        assert controller.wait(2) == 0
+        assert not any(listener.wait_for("JOINT_STATE", lambda s: not any(s.qd)).qd)
