@@ -19,13 +19,13 @@ static void on_joint_state(void *user, enum lw_channel channel, const union lw_m
     (void)channel;
     struct lw_live *live = user;
     const struct lw_joint_state *joint = &message->joint_state;
-    const int64_t now_ns = lw_clock_mono_ns();
-    const enum lw_verdict verdict = lw_lease_take(&live->lease, &joint->stamp, now_ns, LW_LEASE_NS);
+    const int64_t now_ns = lw_clock_mono_ns(), lease_ns = lw_lease_ns(live->control->config.stale_after_ns);
+    const enum lw_verdict verdict = lw_lease_take(&live->lease, &joint->stamp, now_ns, lease_ns);
     if (!lw_refusals_note(&live->control->program->refusals, verdict))
         return;
     // A plant that goes in good order leaves its place to the next one at once.
     if (joint->mode == LW_PLANT_ENDED)
-        live->lease.last_ns -= LW_LEASE_NS;
+        live->lease.last_ns -= lease_ns;
     struct lw_arrival *slot = lw_mailbox_slot(&live->state_box);
     *slot = (struct lw_arrival){.joint = *joint, .arrival_ns = now_ns, .lease = live->lease};
     lw_mailbox_publish(&live->state_box);

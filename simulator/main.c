@@ -21,7 +21,7 @@ struct lw_gate lw_simulation_gate(const struct lw_simulation *simulation)
     const struct lw_plant *plant = &simulation->plant;
     struct lw_gate gate = {.plant_session = plant->session,
                            .open_ns = lw_clock_mono_ns() + start_guard_ns,
-                           .lease_ns = LW_LEASE_NS,
+                           .lease_ns = lw_lease_ns(plant->timeout_ns),
                            .max_lag = 2 * plant->timeout_ns / plant->period_ns};
     memcpy(gate.velocity, plant->velocity, sizeof gate.velocity);
     return gate;

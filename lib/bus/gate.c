@@ -16,6 +16,11 @@ static int64_t add(int64_t sum, int64_t more)
     return more > INT64_MAX - sum ? INT64_MAX : sum + more;
 }
 
+int64_t lw_lease_ns(int64_t patience_ns)
+{
+    return patience_ns > LW_LEASE_NS ? patience_ns : LW_LEASE_NS;
+}
+
 enum lw_verdict lw_lease_take(struct lw_lease *lease, const struct lw_stamp *stamp, int64_t now_ns, int64_t lease_ns)
 {
     const bool held = lease->session != 0;

@@ -15,8 +15,12 @@
 
 #include <stdbool.h> // bool
 
-// Silence after which another sender may take over.
+// Silence after which another sender may take over, at least.
 #define LW_LEASE_NS INT64_C(100000000)
+
+// The same for a receiver with patience of its own: as long as it still goes by the holder's last message, nobody takes
+// over, however slow the holder's rate is.
+int64_t lw_lease_ns(int64_t patience_ns);
 
 // The sender obeyed, one at a time, and what came of its stream.
 struct lw_lease {

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import time
 
 import pytest
 from helpers import Listener, running
@@ -55,6 +56,19 @@ def test_an_answer_is_never_too_early(root):
         os.sched_setaffinity(0, before)
         simulator.terminate()
         simulator.wait(5)
+
+
+def test_a_slow_controller_keeps_its_lease(root):
+    slow = ("-q", "--set=rate_hz=4", "--set=plant.timeout_s=1", "--set=duration_s=60")
+    with running("leeway-simulator", root / "scenarios" / "reach.yaml", *slow):
+        listener = Listener()
+        for seq in range(1, 9):
+            state = listener.wait_for("JOINT_STATE", lambda _: True)
+            listener.bus.publish("JOINT_COMMAND", _command(state, 7, seq))
+            time.sleep(0.18)  # the moment that is tested: the owner is silent, and in time
+            listener.bus.publish("JOINT_COMMAND", _command(state, 8, seq))
+        status = listener.wait_for("PLANT_STATUS", lambda s: s.refused[s.FOREIGN] > 0)
+        assert (status.peer_session, status.takeovers) == (7, 0)
 
 
 def test_no_message_keeps_the_controller_from_its_end(root):
