@@ -156,16 +156,33 @@ static void write_file(const struct lw_postmortem *postmortem, const struct lw_p
         lw_program_fail(program, "%s: cannot be written: %s", path, strerrordesc_np(errno));
 }
 
+// Faults, not seen before, of the ticks since the last look; a short one is gone in the newest.
+//   first_ns  out  when the first of them was
+static unsigned find_faults(struct lw_postmortem *postmortem, const struct lw_health *health, int64_t *first_ns)
+{
+    unsigned faults = 0;
+    const int64_t looked_ns = postmortem->looked_ns;
+    const struct lw_record *record = lw_health_past(health, 0);
+    for (int back = 0; record != NULL && record->time_ns > looked_ns; record = lw_health_past(health, ++back)) {
+        if (back == 0)
+            postmortem->looked_ns = record->time_ns;
+        if ((record->faults & ~postmortem->seen) == 0)
+            continue;
+        faults |= record->faults & ~postmortem->seen;
+        *first_ns = record->time_ns;
+    }
+    return faults;
+}
+
 void lw_postmortem_watch(struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,
                          const struct lw_health *health, struct lw_heard *heard, int64_t now_ns)
 {
-    const struct lw_record *newest = lw_health_past(health, 0);
-    const unsigned faults = newest != NULL ? newest->faults & ~postmortem->seen : 0;
-    if (faults != 0 && postmortem->fault == 0) {
-        postmortem->seen |= faults;
-        postmortem->fault = faults;
-        postmortem->due_ns = newest->time_ns + aftermath_ns;
-    }
+    int64_t first_ns = 0;
+    const unsigned faults = find_faults(postmortem, health, &first_ns);
+    if (faults != 0 && postmortem->fault == 0)
+        postmortem->due_ns = first_ns + aftermath_ns;
+    postmortem->seen |= faults;
+    postmortem->fault |= faults;
     if (postmortem->fault == 0 || now_ns < postmortem->due_ns)
         return;
     write_file(postmortem, program, bus, health, heard);

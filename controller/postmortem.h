@@ -35,12 +35,13 @@ void lw_heard_init(struct lw_heard *heard);
 void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union lw_message *message);
 
 struct lw_postmortem {
-    unsigned seen;  // faults that braked the arm before
-    unsigned fault; // the one to write about, 0 = none
-    int64_t due_ns; // when: a moment later, so that the file shows what followed
+    unsigned seen;     // faults that braked the arm before
+    unsigned fault;    // those to write about, 0 = none
+    int64_t due_ns;    // when: a moment later, so that the file shows what followed
+    int64_t looked_ns; // time of the newest tick looked at
 };
 
-// Main thread, often: looks for new faults in the newest records, and writes the file when it is time.
+// Main thread, often: looks for new faults in the ticks since the last look, and writes the file when it is time.
 //   now_ns  in  INT64_MAX at the end of the process: what is due later is written now
 void lw_postmortem_watch(struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,
                          const struct lw_health *health, struct lw_heard *heard, int64_t now_ns);

@@ -6,7 +6,7 @@ import subprocess
 import time
 
 import pytest
-from helpers import Listener, running
+from helpers import Listener, kill, running, wait_until
 from leeway_lcm import leeway as wire
 
 from leeway.bus import header
@@ -89,3 +89,24 @@ def test_no_message_keeps_the_controller_from_its_end(root):
         controller.send_signal(signal.SIGTERM)
         assert controller.wait(2) == 0
         assert not any(listener.wait_for("JOINT_STATE", lambda s: not any(s.qd)).qd)
+
+
+def test_a_short_fault_has_its_file(root, tmp_path):
+    scene = root / "scenarios" / "reach.yaml"
+    with (
+        running("leeway-simulator", scene) as simulator,
+        running("leeway-controller", scene, f"--post-mortem={tmp_path}"),
+    ):
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", _moving)
+        peer_timeout = wire.status_t.PEER_TIMEOUT
+        for _ in range(20):  # a stop of about the controller's patience, until it was one beyond
+            kill(simulator.pid, signal.SIGSTOP)
+            time.sleep(0.025)
+            kill(simulator.pid, signal.SIGCONT)
+            for _ in range(3):
+                status = listener.wait_for("STATUS", lambda _: True)
+            if status.faults_ever & peer_timeout:
+                break
+        assert status.faults_ever & peer_timeout
+        wait_until(lambda: any(tmp_path.glob("*peer-timeout*.lcm")), 2, "post-mortem file")
