@@ -106,7 +106,8 @@ static void publish(struct loop *loop)
     atomic_fetch_add(&live->state_seq, 1);
     record->sent = lw_simulation_publish_state(live->simulation, live->rt_bus, &record->state) == LW_OK;
     record->skipped = loop->periodic.skipped;
-    record->faults = record->state.mode == LW_PLANT_STOPPING ? LW_FAULT_PEER_TIMEOUT : 0;
+    const bool silence = record->state.mode == LW_PLANT_STOPPING && !atomic_load(&live->stopping);
+    record->faults = silence ? LW_FAULT_PEER_TIMEOUT : 0;
     record->exec_ns = lw_clock_mono_ns() - record->time_ns;
     lw_health_note(&live->health, record);
 }
@@ -142,8 +143,11 @@ static void *run_plant(void *user)
         if (atomic_load(&live->stopping) && lw_plant_at_rest(&s->arm))
             periods_left = 0;
     }
-    // Tells the controller that no more states will come.
+    // Tells the controller that no more states will come. Nobody answers, and this is no work of the last period.
     s->arm.mode = LW_PLANT_ENDED;
+    loop.record.time_ns = lw_clock_mono_ns();
+    loop.record.expected = false;
+    loop.record.age_ns = 0;
     publish(&loop);
     lw_health_end(&live->health);
     atomic_store(&live->rt_done, true);

@@ -1,5 +1,6 @@
 """The live programs at their edges: prompt answers, slow rates, short faults, endings."""
 
+import json
 import os
 import signal
 import subprocess
@@ -110,3 +111,23 @@ def test_a_short_fault_has_its_file(root, tmp_path):
                 break
         assert status.faults_ever & peer_timeout
         wait_until(lambda: any(tmp_path.glob("*peer-timeout*.lcm")), 2, "post-mortem file")
+
+
+def test_the_end_of_a_plant_is_no_fault_and_no_work(root, tmp_path):
+    scene, statistics = root / "scenarios" / "reach.yaml", tmp_path / "plant.json"
+    patient = ("--set=plant.timeout_s=1", "--set=rate_hz=50", "--set=duration_s=1")
+    for ending in ("signal", "done"):
+        options = (f"--histogram={statistics}", *(["--until-done"] if ending == "done" else []))
+        with (
+            running("leeway-controller", scene, "--post-mortem=none", *patient),
+            running("leeway-simulator", scene, *patient, *options) as simulator,
+        ):
+            listener = Listener()
+            listener.wait_for("JOINT_STATE", _moving)
+            if ending == "signal":
+                simulator.terminate()
+            last = listener.wait_for("PLANT_STATUS", lambda s: s.state == s.ENDING)
+            assert simulator.wait(5) == 0
+            assert not last.faults_ever & last.PEER_TIMEOUT, ending
+            # One period is 20 ms; a step of the plant takes some 20 us.
+            assert json.loads(statistics.read_text())["exec_us"]["max_ns"] < 10e6, ending
