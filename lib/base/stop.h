@@ -9,7 +9,7 @@
 #ifndef LW_BASE_STOP_H
 #define LW_BASE_STOP_H
 
-// Catches SIGINT, SIGTERM and SIGHUP from now on.
+// Catches SIGINT, SIGTERM and SIGHUP from now on, and ignores SIGPIPE: a closed stderr does not end the program.
 void lw_stop_install(void);
 
 // Signal that asked to stop, 0 = none yet; and how many came.

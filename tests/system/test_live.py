@@ -131,3 +131,23 @@ def test_the_end_of_a_plant_is_no_fault_and_no_work(root, tmp_path):
             assert not last.faults_ever & last.PEER_TIMEOUT, ending
             # One period is 20 ms; a step of the plant takes some 20 us.
             assert json.loads(statistics.read_text())["exec_us"]["max_ns"] < 10e6, ending
+
+
+def test_words_that_nobody_reads_end_no_program(root):
+    scene = root / "scenarios" / "reach.yaml"
+    reader, writer = os.pipe()
+    simulator = subprocess.Popen([str(program("leeway-simulator")), str(scene)], stderr=writer)
+    os.close(writer)
+    try:
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", lambda _: True)
+        os.close(reader)
+        with running("leeway-controller", scene, "--post-mortem=none") as controller:
+            listener.wait_for("JOINT_STATE", _moving)
+            kill(controller.pid)  # the simulator says that commands cease
+            listener.wait_for("JOINT_STATE", lambda s: s.plant_mode == s.STOPPING and not any(s.qd))
+        simulator.terminate()
+        assert simulator.wait(5) == 0
+    finally:
+        if simulator.poll() is None:
+            simulator.kill()
