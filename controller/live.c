@@ -82,7 +82,7 @@ static int run_threads(struct lw_live *live)
     lw_program_say(program, "%lld ticks, %lld periods skipped, %lld messages refused",
                    (long long)live->control->state.tick, newest != NULL ? (long long)newest->skipped : 0LL,
                    (long long)lw_refusals_total(&program->refusals));
-    lw_program_write_histogram(program, &live->health);
+    ok &= lw_program_write_histogram(program, &live->health);
     return ok ? lw_stop_exit_status() : EXIT_FAILURE;
 }
 

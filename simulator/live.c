@@ -261,7 +261,7 @@ static int run_threads(struct live *live)
     lw_program_say(s->program, "%.3f s of motion, %lld periods skipped, %lld states not sent, %lld messages refused",
                    (double)s->arm.tick * s->plant.period_s, newest != NULL ? (long long)newest->skipped : 0LL,
                    (long long)live->health.unsent, (long long)lw_refusals_total(&s->program->refusals));
-    lw_program_write_histogram(s->program, &live->health);
+    ok &= lw_program_write_histogram(s->program, &live->health);
     return ok ? lw_stop_exit_status() : EXIT_FAILURE;
 }
 

@@ -107,15 +107,18 @@ enum lw_status lw_program_report(const struct lw_program *program, struct lw_bus
     return lw_bus_publish(bus, program->is_simulator ? LW_CHANNEL_PLANT_STATUS : LW_CHANNEL_STATUS, &message);
 }
 
-void lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health)
+bool lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health)
 {
     if (program->histogram == NULL)
-        return;
+        return true;
     FILE *to = fopen(program->histogram, "w");
     if (to != NULL)
         lw_health_write(health, program->name, program->realtime, to);
-    if (to == NULL || fclose(to) != 0)
+    // A failure in the middle shows in ferror alone.
+    const bool written = to != NULL && fflush(to) == 0 && !ferror(to);
+    if (!written)
         lw_program_fail(program, "%s: cannot write the statistics: %s", program->histogram, strerrordesc_np(errno));
+    return (to == NULL || fclose(to) == 0) && written;
 }
 
 bool lw_program_thread(const struct lw_program *program, pthread_t *thread, void *(*run)(void *), void *user)

@@ -84,8 +84,8 @@ void lw_program_normal_thread(void);
 LW_MUST_CHECK enum lw_status lw_program_report(const struct lw_program *program, struct lw_bus *bus,
                                                struct lw_health *health, struct lw_report *report);
 
-// Writes the statistics asked for by --histogram; says when it cannot.
-void lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health);
+// Writes the statistics asked for by --histogram; false, and it says why, when it cannot.
+LW_MUST_CHECK bool lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health);
 
 // Starts a thread; says so when there is none to be had.
 LW_MUST_CHECK bool lw_program_thread(const struct lw_program *program, pthread_t *thread, void *(*run)(void *),

@@ -151,3 +151,13 @@ def test_words_that_nobody_reads_end_no_program(root):
     finally:
         if simulator.poll() is None:
             simulator.kill()
+
+
+def test_statistics_that_cannot_be_written_are_a_failure(root):
+    scene = root / "scenarios" / "reach.yaml"
+    with running("leeway-controller", scene, "--histogram=/dev/full") as controller:
+        Listener().wait_for("JOINT_COMMAND", lambda c: not c.flags & c.WARMING_UP)
+        controller.terminate()
+        said = controller.communicate(timeout=5)[1]
+    assert controller.returncode == 1
+    assert "/dev/full: cannot write the statistics: No space left on device" in said
