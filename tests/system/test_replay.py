@@ -270,9 +270,7 @@ def test_damage_is_found_where_it_was_done(root: Path, tmp_path: Path) -> None:
     assert [f["name"] for f in c["first"]["fields"]] == ["qd[1]"]
 
 
-def test_another_scene_shows_at_the_first_tick_it_matters_to(
-    short_log: Path, tmp_path: Path
-) -> None:
+def test_another_scene_shows_at_the_first_tick(short_log: Path, tmp_path: Path) -> None:
     damage = Damage(short_log, tmp_path)
     damage.events = [
         (t, name, data.replace(b"k_a: 1", b"k_a: 2") if name == "SCENE" else data)
@@ -280,7 +278,8 @@ def test_another_scene_shows_at_the_first_tick_it_matters_to(
     ]
     status, found = damage.replace(0, [])
     (c,) = found["controllers"]
-    assert (status, c["first"]["tick"], c["first"]["right_inputs"]) == (1, 1, True)
+    assert (status, c["first"]["tick"], c["first"]["right_inputs"]) == (1, 1, False)
+    assert [change["name"] for change in c["first"]["changed"]] == ["SCENE"]
 
 
 def test_what_is_missing_is_said(short_log: Path, tmp_path: Path) -> None:
