@@ -6,6 +6,7 @@ import pytest
 from leeway_lcm import leeway as wire
 
 from leeway import bus
+from leeway.connection import parse
 
 
 @pytest.mark.parametrize(
@@ -25,3 +26,26 @@ def test_the_address_of_a_bus() -> None:
     for url in ("", "udpm://10.0.0.1:7000", "udpm://239.1.2.3:0", "udpm://239.1.2.3:65536", "x"):
         with pytest.raises(bus.BusError, match="expected udpm"):
             bus.address(url)
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"",
+        b"LC02",
+        b"LC02\0\0\0\1",
+        b"LC02\0\0\0\1\0payload",
+        b"LC02\0\0\0\1GOAL",
+        b"LC03\0\0\0\1GOAL\0payload",
+        b"lc02\0\0\0\1GOAL\0payload",
+        b"LC02\0\0\0\1" + b"X" * 64 + b"\0payload",
+        b"LC02\0\0\0\1G\xc3\x96\0payload",
+    ],
+)
+def test_packets_that_are_no_message(packet: bytes) -> None:
+    assert parse(packet) is None
+
+
+def test_packets_that_are_a_message() -> None:
+    assert parse(b"LC02\0\0\0\1GOAL\0pay\0load") == ("GOAL", b"pay\0load")
+    assert parse(b"LC02\0\0\0\0" + b"X" * 63 + b"\0") == ("X" * 63, b"")

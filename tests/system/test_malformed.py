@@ -9,19 +9,19 @@ from __future__ import annotations
 import json
 import math
 import os
+import socket
 import subprocess
 import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import lcm
 import pytest
 from helpers import leeway, running, wait_until
 from leeway_lcm import leeway as wire
-from wiretap import Wiretap
+from wiretap import GROUP, PORT, Wiretap
 
-from leeway.bus import UPSERT, resolve_url, send_goal, send_obstacles
+from leeway.bus import UPSERT, open_bus, resolve_url, send_goal, send_obstacles
 from leeway.status import REASONS
 
 pytestmark = pytest.mark.usefixtures("private_network")
@@ -175,7 +175,7 @@ def _check_counts(kind: str, refused: Counter[str]) -> None:
 
 def _obey_goal(witness: Witness) -> None:
     """A good message is still taken: the goal that is in force anyway, from a new sender."""
-    command = send_goal(lcm.LCM(resolve_url(None)), None, GOAL)
+    command = send_goal(open_bus(resolve_url(None)), None, GOAL)
     assert command is not None, "no echo of a goal"
     witness.requests.add(command.request_session)
     witness.look()
@@ -184,7 +184,7 @@ def _obey_goal(witness: Witness) -> None:
 def _obey_obstacle(witness: Witness) -> None:
     """So is an obstacle, far away."""
     witness.look()
-    bus = lcm.LCM(resolve_url(None))
+    bus = open_bus(resolve_url(None))
     command = send_obstacles(bus, None, UPSERT, [(77, (50.0, 0.0, 0.0), 0.1)])
     assert command is not None, "no echo of an obstacle"
     assert command.obstacle_count == 2
@@ -220,6 +220,21 @@ def _check_timing(witness: Witness, before: Any, seconds: float) -> None:
     print(f"skipped {skipped} of {ticks} periods in {seconds:.0f} s")
     # Other work on this machine costs some too.
     assert skipped <= ticks / 100 or not before.realtime & wire.status_t.FIFO
+
+
+def test_a_name_without_an_end_does_not_end_a_tool():
+    """LCM's own Python module is ended by the first of these behind a good message."""
+    heard: list[bytes] = []
+    bus = open_bus(resolve_url(None))
+    bus.subscribe("JOINT_COMMAND", lambda _, data: heard.append(data))
+    good = b"LC02\0\0\0\1JOINT_COMMAND\0" + bytes(361)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for _ in range(200):
+            for packet in (good, b"LC02\0\0\0\1JOINT_COMMAND", b"LC03" + good[4:], b"", good[:-1]):
+                sender.sendto(packet, (GROUP, PORT))
+            bus.handle(0.1)
+    wait_until(lambda: bus.handle(0.05) or len(heard) >= 400, 5, "good message")
+    assert [len(data) for data in heard] == [361, 360] * 200
 
 
 def test_malformed_packets_do_no_harm(root, tmp_path):

@@ -7,15 +7,15 @@ import ipaddress
 import os
 import re
 import secrets
-import select
 import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import lcm
 from leeway_lcm import leeway as wire
+
+from leeway.connection import Connection
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 UPSERT, REMOVE, CLEAR = wire.obstacles_t.UPSERT, wire.obstacles_t.REMOVE, wire.obstacles_t.CLEAR
@@ -67,7 +67,7 @@ def address(url: str) -> tuple[str, int]:
     return match[1], int(match[2])
 
 
-def open_bus(url: str) -> lcm.LCM:
+def open_bus(url: str) -> Connection:
     """Open a bus.
 
     Raises
@@ -86,19 +86,9 @@ def open_bus(url: str) -> lcm.LCM:
             "multicast on && sudo ip route add 224.0.0.0/4 dev lo"
         ) from error
     try:
-        return lcm.LCM(url)
+        return Connection(url, target, RECEIVE_BUFFER)
     except RuntimeError as error:
         raise BusError(f"LCM cannot open {url}") from error
-
-
-def handle(bus: lcm.LCM, seconds: float) -> None:
-    """Wait for messages and hand one to its handler. A signal does not disturb the wait.
-
-    LCM's own timeout fails when a signal comes; Python's select goes on waiting.
-    """
-    ready, _, _ = select.select([bus.fileno()], [], [], seconds)
-    if ready:
-        bus.handle()
 
 
 @functools.cache
@@ -136,7 +126,7 @@ def channel(name: str, robot: str | None) -> str:
 
 
 def send_until_echoed(
-    bus: lcm.LCM,
+    bus: Connection,
     to_channel: str,
     message: Any,
     command_channel: str,
@@ -161,11 +151,11 @@ def send_until_echoed(
         bus.publish(to_channel, message.encode())
         again = time.monotonic() + REPEAT_S
         while not found and (left := again - time.monotonic()) > 0:
-            handle(bus, left)
+            bus.handle(left)
     return found[0] if found else None
 
 
-def send_goal(bus: lcm.LCM, robot: str | None, goal: tuple[float, float, float] | None) -> Any:
+def send_goal(bus: Connection, robot: str | None, goal: tuple[float, float, float] | None) -> Any:
     """Send GOAL (m, base frame), or STOP for None, as `send_until_echoed` does."""
     session = new_session()
     message = wire.stop_t() if goal is None else wire.goal_t()
@@ -182,7 +172,7 @@ def send_goal(bus: lcm.LCM, robot: str | None, goal: tuple[float, float, float] 
 
 
 def send_obstacles(
-    bus: lcm.LCM,
+    bus: Connection,
     robot: str | None,
     op: int,
     entries: list[tuple[int, tuple[float, float, float], float]],

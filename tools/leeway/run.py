@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 
-import lcm
 from leeway_lcm import leeway as wire
 
 from leeway import bus as bus_tools
+from leeway.connection import Connection
 from leeway.processes import Child
 from leeway.scene import Scene
 
@@ -73,13 +73,12 @@ class _Interrupt:
 class _Watch:
     """Follows the arm on the bus: time of motion and whether it moves."""
 
-    def __init__(self, bus: lcm.LCM, name: str | None) -> None:
+    def __init__(self, bus: Connection, name: str | None) -> None:
         self.bus = bus
         self.motion_s = NEVER_MOVED
         self.at_rest = True
         self._sessions: set[int] = set()
-        subscription = bus.subscribe(bus_tools.channel("JOINT_STATE", name), self._on_state)
-        subscription.set_queue_capacity(1)
+        bus.subscribe(bus_tools.channel("JOINT_STATE", name), self._on_state)
 
     def _on_state(self, _: str, data: bytes) -> None:
         state = bus_tools.decode(wire.joint_state_t, data)
@@ -96,7 +95,7 @@ class _Watch:
 
     def wait(self) -> None:
         """Handle what comes in the next moment."""
-        bus_tools.handle(self.bus, POLL_S)
+        self.bus.handle(POLL_S)
 
 
 def take_log_name(scene: str) -> Path:
@@ -158,14 +157,14 @@ def run(config: RunConfig, progress: Callable[[float], None] | None = None) -> f
             _stop(config, bus, children)
 
 
-def _refuse_company(bus: lcm.LCM, name: str | None) -> None:
+def _refuse_company(bus: Connection, name: str | None) -> None:
     """Listen for a moment; two plants or controllers on one bus would mix their messages."""
     heard: list[str] = []
     for channel in ("JOINT_STATE", "JOINT_COMMAND"):
         bus.subscribe(bus_tools.channel(channel, name), lambda found, _: heard.append(found))
     end = time.monotonic() + LISTEN_S
     while not heard and (left := end - time.monotonic()) > 0:
-        bus_tools.handle(bus, left)
+        bus.handle(left)
     if heard:
         raise RunFailed(
             f"another run is on this bus ({heard[0]} heard): stop it, or use another "
@@ -173,7 +172,7 @@ def _refuse_company(bus: lcm.LCM, name: str | None) -> None:
         )
 
 
-def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> None:
+def _start(config: RunConfig, url: str, bus: Connection, children: list[Child]) -> None:
     """Start logger, simulator, controller; the logger records before the others begin."""
     config.log.parent.mkdir(parents=True, exist_ok=True)
     if config.log.exists() and not config.log.is_file():
@@ -194,7 +193,7 @@ def _start(config: RunConfig, url: str, bus: lcm.LCM, children: list[Child]) -> 
     children.append(Child("leeway-controller", f"--post-mortem={config.log.parent}", *args))
 
 
-def _stop(config: RunConfig, bus: lcm.LCM, children: list[Child]) -> None:
+def _stop(config: RunConfig, bus: Connection, children: list[Child]) -> None:
     """Stop the controller, which brakes the arm; then the plant; the recorder last."""
     for child in reversed(children[1:]):
         child.stop()
@@ -203,7 +202,7 @@ def _stop(config: RunConfig, bus: lcm.LCM, children: list[Child]) -> None:
         children[0].stop()
 
 
-def _wait_for_mark(logger: Child, bus: lcm.LCM, log: Path) -> None:
+def _wait_for_mark(logger: Child, bus: Connection, log: Path) -> None:
     """Wait until the log holds a mark published last: lcm-logger drops its backlog at its end."""
     mark = f"leeway run ends {bus_tools.new_session()}\n\0".encode()
     end = time.monotonic() + LOGGER_PATIENCE_S
@@ -221,7 +220,7 @@ def _tail(log: Path) -> bytes:
         return file.read()
 
 
-def _wait_for_logger(logger: Child, bus: lcm.LCM, log: Path) -> None:
+def _wait_for_logger(logger: Child, bus: Connection, log: Path) -> None:
     """Wait until the logger has written something: a probe, sent again and again."""
     end = time.monotonic() + LOGGER_PATIENCE_S
     while not (log.exists() and log.stat().st_size > 0):
@@ -233,7 +232,7 @@ def _wait_for_logger(logger: Child, bus: lcm.LCM, log: Path) -> None:
 
 def _watch(
     config: RunConfig,
-    bus: lcm.LCM,
+    bus: Connection,
     children: list[Child],
     interrupt: _Interrupt,
     progress: Callable[[float], None] | None,

@@ -99,14 +99,14 @@ class Ear:
         """Handle what comes within a time."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
-            bus_tools.handle(self._bus, left)
+            self._bus.handle(left)
 
     def look(self) -> list[Sender]:
         """Listen until both programs were heard, or for 1.5 s; return who was heard."""
         end = time.monotonic() + LISTEN_S
         self.listen(ENOUGH_S)
         while (left := end - time.monotonic()) > 0 and not self._both():
-            bus_tools.handle(self._bus, left)
+            self._bus.handle(left)
         return self.senders
 
     def _both(self) -> bool:

@@ -12,10 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import lcm
 import numpy as np
 
-from leeway.bus import handle
+from leeway.connection import Connection
 from leeway.logs.framing import open_events
 from leeway.logs.log import Floats, Ints
 from leeway.replay.keys import Keys
@@ -222,13 +221,13 @@ def play(player: Player, keys: Keys, show: Callable[[float], None]) -> None:
             return
 
 
-def company(bus: lcm.LCM, recording: Recording) -> str | None:
+def company(bus: Connection, recording: Recording) -> str | None:
     """Listen for a moment; return a channel of an arm that somebody publishes already."""
     heard: list[str] = []
     for channel in recording.channels:
         if ARM_CHANNEL.fullmatch(channel):
-            bus.subscribe(re.escape(channel), lambda found, _: heard.append(found))
+            bus.subscribe(channel, lambda found, _: heard.append(found))
     end = time.monotonic() + LISTEN_S
     while not heard and (left := end - time.monotonic()) > 0:
-        handle(bus, left)
+        bus.handle(left)
     return heard[0] if heard else None
