@@ -16,6 +16,7 @@
 #include <string.h>   // strerrordesc_np
 #include <sys/stat.h> // mkdir
 #include <time.h>     // strftime
+#include <unistd.h>   // getpid
 
 enum { PATH_MAX_BYTES = 512, FOLDER_MODE = 0777 };
 static const int64_t aftermath_ns = LW_NS_PER_S / 5;
@@ -123,13 +124,15 @@ static const char *fault_name(unsigned fault)
     return fault & LW_FAULT_PEER_TIMEOUT ? "peer-timeout" : fault & LW_FAULT_LEASE ? "lease" : "bad-input";
 }
 
+// The process id tells the files of two controllers apart that lost their plants in the same second.
 static void make_path(const struct lw_program *program, unsigned fault, char path[PATH_MAX_BYTES])
 {
     char when[32];
     const time_t now = time(NULL);
     struct tm local;
     (void)strftime(when, sizeof when, "%Y%m%d-%H%M%S", localtime_r(&now, &local));
-    snprintf(path, PATH_MAX_BYTES, "%s/postmortem-%s-%s.lcm", program->postmortem, when, fault_name(fault));
+    snprintf(path, PATH_MAX_BYTES, "%s/postmortem-%s-%s-%d.lcm", program->postmortem, when, fault_name(fault),
+             (int)getpid());
 }
 
 static void write_file(const struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,

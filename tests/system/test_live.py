@@ -6,11 +6,12 @@ import signal
 import subprocess
 import time
 
+import lcm
 import pytest
 from helpers import Listener, kill, running, wait_until
 from leeway_lcm import leeway as wire
 
-from leeway.bus import header
+from leeway.bus import header, resolve_url
 from leeway.processes import program
 
 pytestmark = pytest.mark.usefixtures("private_network")
@@ -111,6 +112,41 @@ def test_a_short_fault_has_its_file(root, tmp_path):
                 break
         assert status.faults_ever & peer_timeout
         wait_until(lambda: any(tmp_path.glob("*peer-timeout*.lcm")), 2, "post-mortem file")
+
+
+def test_two_controllers_that_fault_at_once_write_two_files(root, tmp_path):
+    scene, folder = root / "scenarios" / "reach.yaml", f"--post-mortem={tmp_path}"
+    with (
+        running("leeway-simulator", scene, "--name=A") as a,
+        running("leeway-simulator", scene, "--name=B") as b,
+        running("leeway-controller", scene, "--name=A", folder) as one,
+        running("leeway-controller", scene, "--name=B", folder) as two,
+    ):
+        own = lcm.LCM(resolve_url(None))
+        moving = set()
+        for name in "AB":
+            own.subscribe(
+                f"{name}_JOINT_STATE",
+                lambda channel, data: (
+                    moving.add(channel[0]) if _moving(wire.joint_state_t.decode(data)) else None
+                ),
+            )
+        wait_until(lambda: own.handle_timeout(50) and len(moving) == 2, 10, "motion of both")
+        for simulator in (a, b):
+            kill(simulator.pid)
+        for controller in (one, two):
+            wait_until(lambda c=controller: _file_of(tmp_path, c.pid), 3, "post-mortem file")
+    for name, controller in (("A", one), ("B", two)):
+        (found,) = _file_of(tmp_path, controller.pid)
+        channels = {event.channel for event in lcm.EventLog(str(found))}
+        assert channels == {f"{name}_{c}" for c in ("SCENE", "JOINT_STATE", "JOINT_COMMAND")} | {
+            "OBSTACLES"
+        }
+
+
+def _file_of(folder, pid):
+    """Return the post-mortem files of a process."""
+    return list(folder.glob(f"postmortem-*-{pid}.lcm"))
 
 
 def test_the_end_of_a_plant_is_no_fault_and_no_work(root, tmp_path):
