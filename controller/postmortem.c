@@ -30,14 +30,15 @@ void lw_heard_init(struct lw_heard *heard)
 
 void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union lw_message *message)
 {
+    struct lw_heard_past *past = &heard->past;
     pthread_mutex_lock(&heard->lock);
-    struct lw_heard_message *slot = &heard->newest[heard->next];
+    struct lw_heard_message *slot = &past->newest[past->next];
     // The oldest makes room: what it changed stays in the world before.
-    if (heard->count == LW_HEARD_MAX && slot->channel == LW_CHANNEL_OBSTACLES)
-        (void)(lw_world_apply(&heard->before, &slot->message.obstacles) == LW_OK); // it was taken once already
+    if (past->count == LW_HEARD_MAX && slot->channel == LW_CHANNEL_OBSTACLES)
+        (void)(lw_world_apply(&past->before, &slot->message.obstacles) == LW_OK); // it was taken once already
     *slot = (struct lw_heard_message){.channel = (int)channel, .message = *message, .time_ns = lw_clock_mono_ns()};
-    heard->next = (heard->next + 1) % LW_HEARD_MAX;
-    heard->count += heard->count < LW_HEARD_MAX;
+    past->next = (past->next + 1) % LW_HEARD_MAX;
+    past->count += past->count < LW_HEARD_MAX;
     pthread_mutex_unlock(&heard->lock);
 }
 
@@ -88,7 +89,7 @@ static void write_before(struct writer *w, const struct lw_world *world, int64_t
 }
 
 // Messages heard up to a time, from the one numbered `from` on. Returns the number of the next.
-static int write_heard(struct writer *w, const struct lw_heard *heard, int from, int64_t until_ns)
+static int write_heard(struct writer *w, const struct lw_heard_past *heard, int from, int64_t until_ns)
 {
     for (; from < heard->count; from++) {
         const int oldest = heard->count < LW_HEARD_MAX ? 0 : heard->next;
@@ -101,7 +102,7 @@ static int write_heard(struct writer *w, const struct lw_heard *heard, int from,
 }
 
 // Every tick: its state when it is a new one, then its command.
-static void write_ticks(struct writer *w, const struct lw_health *health, const struct lw_heard *heard)
+static void write_ticks(struct writer *w, const struct lw_health *health, const struct lw_heard_past *heard)
 {
     int back = 0, next = 0;
     while (lw_health_past(health, back) != NULL)
@@ -135,7 +136,7 @@ static void make_path(const struct lw_program *program, unsigned fault, char pat
              (int)getpid());
 }
 
-static void write_file(const struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,
+static void write_file(struct lw_postmortem *postmortem, const struct lw_program *program, struct lw_bus *bus,
                        const struct lw_health *health, struct lw_heard *heard)
 {
     char path[PATH_MAX_BYTES];
@@ -145,11 +146,13 @@ static void write_file(const struct lw_postmortem *postmortem, const struct lw_p
     if (mkdir(program->postmortem, FOLDER_MODE) == 0 || errno == EEXIST)
         status = lw_log_open(path, bus, &w.log);
     if (status == LW_OK) {
-        const struct lw_bus_scene scene = lw_program_scene(program);
+        // A copy, so that the world thread need not wait for the disk: obstacles and STOP go on being heard.
         pthread_mutex_lock(&heard->lock);
-        lw_log_write_scene(w.log, &scene, lw_clock_utime());
-        write_ticks(&w, health, heard);
+        postmortem->heard = heard->past;
         pthread_mutex_unlock(&heard->lock);
+        const struct lw_bus_scene scene = lw_program_scene(program);
+        lw_log_write_scene(w.log, &scene, lw_clock_utime());
+        write_ticks(&w, health, &postmortem->heard);
         status = lw_log_close(w.log);
     }
     if (status == LW_OK)

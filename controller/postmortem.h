@@ -18,8 +18,7 @@
 enum { LW_HEARD_MAX = 256 };
 
 // What the world thread took in: the newest messages, and the obstacles before them.
-struct lw_heard {
-    pthread_mutex_t lock;
+struct lw_heard_past {
     struct lw_world before; // all older messages merged
     struct lw_heard_message {
         int channel; // enum lw_channel
@@ -29,16 +28,22 @@ struct lw_heard {
     int count, next;
 };
 
+struct lw_heard {
+    pthread_mutex_t lock;
+    struct lw_heard_past past;
+};
+
 void lw_heard_init(struct lw_heard *heard);
 
 // World thread: notes a message that was taken.
 void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union lw_message *message);
 
 struct lw_postmortem {
-    unsigned seen;     // faults that braked the arm before
-    unsigned fault;    // those to write about, 0 = none
-    int64_t due_ns;    // when: a moment later, so that the file shows what followed
-    int64_t looked_ns; // time of the newest tick looked at
+    unsigned seen;              // faults that braked the arm before
+    unsigned fault;             // those to write about, 0 = none
+    int64_t due_ns;             // when: a moment later, so that the file shows what followed
+    int64_t looked_ns;          // time of the newest tick looked at
+    struct lw_heard_past heard; // copy that is written
 };
 
 // Main thread, often: looks for new faults in the ticks since the last look, and writes the file when it is time.

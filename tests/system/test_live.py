@@ -1,9 +1,13 @@
 """The live programs at their edges: prompt answers, slow rates, short faults, endings."""
 
+import array
+import contextlib
+import fcntl
 import json
 import os
 import signal
 import subprocess
+import termios
 import time
 
 import lcm
@@ -147,6 +151,39 @@ def test_two_controllers_that_fault_at_once_write_two_files(root, tmp_path):
 def _file_of(folder, pid):
     """Return the post-mortem files of a process."""
     return list(folder.glob(f"postmortem-*-{pid}.lcm"))
+
+
+def test_a_slow_disk_keeps_nobody_from_being_heard(root, tmp_path):
+    scene = root / "scenarios" / "reach.yaml"
+    with contextlib.ExitStack() as stack:
+        simulator = stack.enter_context(running("leeway-simulator", scene))
+        controller = stack.enter_context(
+            running("leeway-controller", scene, f"--post-mortem={tmp_path}")
+        )
+        readers = []
+        stack.callback(lambda: [os.close(reader) for reader in readers])
+        # Pipes that nobody empties, one for each second in which the fault may come.
+        now = time.time()
+        for second in range(-1, 20):
+            when = time.strftime("%Y%m%d-%H%M%S", time.localtime(now + second))
+            path = tmp_path / f"postmortem-{when}-peer-timeout-{controller.pid}.lcm"
+            os.mkfifo(path)
+            readers.append(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", _moving)
+        kill(simulator.pid)
+        wait_until(lambda: any(map(_is_full, readers)), 5, "full pipe")
+        stop = wire.stop_t()
+        stop.h = header(5, 1)
+        listener.bus.publish("STOP", stop.encode())
+        listener.wait_for("JOINT_COMMAND", lambda c: c.request_session == 5, seconds=2)
+
+
+def _is_full(reader):
+    """Whether a pipe holds so much that its writer waits."""
+    waiting = array.array("i", [0])
+    fcntl.ioctl(reader, termios.FIONREAD, waiting)
+    return waiting[0] > 60000
 
 
 def test_the_end_of_a_plant_is_no_fault_and_no_work(root, tmp_path):
