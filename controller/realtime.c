@@ -78,6 +78,16 @@ static const struct lw_arrival *step(struct loop *loop)
     return arrival;
 }
 
+// Moves the next deadline half a plant period behind the arrivals. A plant slower than this loop, or one that says so,
+// moves it by no more than one of our own periods.
+static void follow(struct loop *loop, const struct lw_arrival *arrival)
+{
+    const int64_t own_ns = loop->periodic.period_ns, plant_ns = arrival->joint.period_ns;
+    const bool idle = loop->message.joint_command.mode == LW_COMMAND_IDLE;
+    loop->periodic.deadline_ns += lw_phase_correct(&loop->phase, loop->periodic.deadline_ns, arrival->arrival_ns,
+                                                   plant_ns < own_ns ? plant_ns : own_ns, idle);
+}
+
 void *lw_live_realtime(void *user)
 {
     static struct loop loop;
@@ -88,10 +98,8 @@ void *lw_live_realtime(void *user)
     loop.periodic = lw_periodic_start(loop.start_ns, live->control->config.period_ns);
     for (bool ended = false; !ended;) {
         const struct lw_arrival *arrival = step(&loop);
-        const bool idle = loop.message.joint_command.mode == LW_COMMAND_IDLE;
         if (loop.record.fresh)
-            loop.periodic.deadline_ns += lw_phase_correct(&loop.phase, loop.periodic.deadline_ns, arrival->arrival_ns,
-                                                          arrival->joint.period_ns, idle);
+            follow(&loop, arrival);
         // An arm that another controller moves is not ours to bring to rest.
         const bool foreign = (loop.message.joint_command.flags & LW_FOREIGN) != 0;
         const bool rest = foreign || lw_controller_at_rest(&live->control->state);

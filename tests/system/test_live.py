@@ -64,6 +64,33 @@ def test_an_answer_is_never_too_early(root):
         simulator.wait(5)
 
 
+def test_no_plant_slows_the_controller_down(root):
+    # Every period is a tick or counted as skipped, also when states claim to come once a second.
+    scene = root / "scenarios" / "reach.yaml"
+    with running("leeway-controller", scene, "--post-mortem=none"):
+        listener = Listener()
+        commands = []
+        listener.bus.subscribe(
+            "JOINT_COMMAND", lambda _, data: commands.append(wire.joint_command_t.decode(data))
+        )
+        world, state = wire.obstacles_t(), wire.joint_state_t()
+        world.h, world.op = header(9, 1), world.REPLACE
+        listener.wait_for("JOINT_COMMAND", lambda c: not c.flags & c.WARMING_UP)
+        listener.bus.publish("OBSTACLES", world.encode())
+        state.q, state.period_ns = [0.1] * 6, 10**9
+        for seq in range(1, 801):
+            state.h = header(4, seq)
+            listener.bus.publish("JOINT_STATE", state.encode())
+            due = time.monotonic() + 0.002
+            while (left := due - time.monotonic()) > 0:
+                listener.bus.handle_timeout(1 + int(left * 1000))
+    first, last = commands[0], commands[-1]
+    assert any(c.mode == c.VELOCITY for c in commands)
+    counted = last.tick - first.tick + last.skipped - first.skipped
+    elapsed = (last.tick_ns - first.tick_ns) / 2e6
+    assert counted == pytest.approx(elapsed, rel=0.05, abs=3)
+
+
 def test_a_slow_controller_keeps_its_lease(root):
     slow = ("-q", "--set=rate_hz=4", "--set=plant.timeout_s=1", "--set=duration_s=60")
     with running("leeway-simulator", root / "scenarios" / "reach.yaml", *slow):
