@@ -41,6 +41,7 @@ struct live {
     struct lw_lease lease;         // rx
     atomic_int_fast64_t state_seq; // rt -> rx: newest state published, or just being published
     atomic_bool stopping;          // main -> rt: ramp to rest, then end
+    atomic_bool abandoned;         // main -> rt: end now, a second signal came
     atomic_bool rt_done;           // rt -> all
     atomic_bool bus_failed;        // rx -> main
 };
@@ -140,7 +141,7 @@ static void *run_plant(void *user)
         if (!done)
             step(&loop);
         periods_left -= done;
-        if (atomic_load(&live->stopping) && lw_plant_at_rest(&s->arm))
+        if (atomic_load(&live->stopping) && (lw_plant_at_rest(&s->arm) || atomic_load(&live->abandoned)))
             periods_left = 0;
     }
     // Tells the controller that no more states will come. Nobody answers, and this is no work of the last period.
@@ -235,6 +236,8 @@ static bool serve(struct live *live)
         report(live, &before);
         if (lw_stop_signal() != 0 || atomic_load(&live->bus_failed))
             atomic_store(&live->stopping, true);
+        if (lw_stop_count() > 1)
+            atomic_store(&live->abandoned, true);
     }
     report(live, &before);
     return !atomic_load(&live->bus_failed);

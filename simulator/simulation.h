@@ -20,7 +20,8 @@ struct lw_simulation {
     int64_t last_tick; // plant periods after which the scene is done
 };
 
-// Fixed rate, own clock, real-time threads. Ends when done, or on SIGINT or SIGTERM after ramping to rest.
+// Fixed rate, own clock, real-time threads. Ends when done, or on SIGINT or SIGTERM after ramping to rest; a
+// second one ends it at once.
 int lw_simulation_live(struct lw_simulation *simulation);
 
 // Waits for the controller's answer once per controller period. Ends when done, or on SIGINT or SIGTERM.

@@ -233,6 +233,22 @@ def test_the_end_of_a_plant_is_no_fault_and_no_work(root, tmp_path):
             assert json.loads(statistics.read_text())["exec_us"]["max_ns"] < 10e6, ending
 
 
+def test_a_second_signal_ends_the_simulator_at_once(root):
+    scene = root / "scenarios" / "reach.yaml"
+    slow = [f"--set={who}.acceleration=0.02" for who in ("limits", "plant")]
+    with (
+        running("leeway-controller", scene, "--post-mortem=none", *slow),
+        running("leeway-simulator", scene, *slow) as simulator,
+    ):
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", _moving)
+        simulator.send_signal(signal.SIGINT)
+        listener.wait_for("JOINT_STATE", lambda s: s.plant_mode == s.STOPPING)
+        simulator.send_signal(signal.SIGINT)
+        assert simulator.wait(1) == 130  # the ramp alone takes 2.5 s
+        assert any(listener.wait_for("JOINT_STATE", lambda s: s.plant_mode == s.ENDED).qd)
+
+
 def test_words_that_nobody_reads_end_no_program(root):
     scene = root / "scenarios" / "reach.yaml"
     reader, writer = os.pipe()
