@@ -30,14 +30,13 @@ static enum lw_run_state run_state(const struct lw_live *live, const struct lw_j
 // Statistics and STATUS, once.
 static void report(struct lw_live *live, int64_t now_ns)
 {
-    const struct lw_program *program = live->control->program;
+    struct lw_program *program = live->control->program;
     const struct lw_record *newest = lw_health_collect(&live->health);
     if (newest == NULL)
         return;
     struct lw_report report = {.state = run_state(live, &newest->command),
                                .distance = newest->command.nearest.distance};
-    if (lw_program_report(program, live->status_bus, &live->health, &report) != LW_OK)
-        lw_program_say(program, "STATUS could not be sent");
+    lw_program_report(program, live->status_bus, &live->health, &report);
     if (program->postmortem != NULL)
         lw_postmortem_watch(&live->postmortem, program, live->status_bus, &live->health, &live->heard, now_ns);
 }

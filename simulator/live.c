@@ -162,12 +162,14 @@ static void *sense(void *user)
     struct live *live = user;
     const struct lw_program *program = live->simulation->program;
     struct lw_bus *bus = NULL;
+    bool failing = false;
     if (lw_program_open(program, &bus) != LW_OK)
         atomic_store(&live->bus_failed, true);
     struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), POLL_MS * INT64_C(1000000));
     for (int poll = 0; !atomic_load(&live->rt_done) && !atomic_load(&live->bus_failed); poll++) {
-        if (poll % OBSTACLE_POLLS == 0 && lw_simulation_publish_obstacles(live->simulation, bus) != LW_OK)
-            lw_program_say(program, "OBSTACLES could not be sent");
+        if (poll % OBSTACLE_POLLS == 0)
+            lw_program_say_sent(program, "OBSTACLES", lw_simulation_publish_obstacles(live->simulation, bus) == LW_OK,
+                                &failing);
         (void)lw_periodic_wait(&loop);
     }
     lw_bus_close(bus);
@@ -214,14 +216,12 @@ static enum lw_run_state run_state(const struct live *live, const struct lw_reco
 // Statistics, PLANT_STATUS and words, once.
 static void report(struct live *live, enum lw_plant_mode *before)
 {
-    const struct lw_program *program = live->simulation->program;
     const struct lw_record *newest = lw_health_collect(&live->health);
     if (newest == NULL)
         return;
     say_mode(live, &newest->state, before);
     struct lw_report report = {.state = run_state(live, newest), .distance = -1};
-    if (lw_program_report(program, live->main_bus, &live->health, &report) != LW_OK)
-        lw_program_say(program, "PLANT_STATUS could not be sent");
+    lw_program_report(live->simulation->program, live->main_bus, &live->health, &report);
 }
 
 // Reports, announcements and signals, until the real-time thread is done.

@@ -113,7 +113,7 @@ static void come_to_rest(struct lockstep *l)
 int lw_simulation_lockstep(struct lw_simulation *simulation)
 {
     static struct lockstep lockstep;
-    const struct lw_program *program = simulation->program;
+    struct lw_program *program = simulation->program;
     lockstep.simulation = simulation;
     // The plant waits for its answer, however late: neither age nor start-up matter.
     lockstep.gate = lw_simulation_gate(simulation);

@@ -45,6 +45,13 @@ void lw_program_fail(const struct lw_program *program, const char *format, ...)
     va_end(args);
 }
 
+void lw_program_say_sent(const struct lw_program *program, const char *channel, bool sent, bool *failing)
+{
+    if (sent == *failing)
+        lw_program_say(program, sent ? "%s is sent again" : "%s cannot be sent", channel);
+    *failing = !sent;
+}
+
 // --- bus ---
 
 static enum lw_status open_bus(const struct lw_program *program, bool own_socket, struct lw_bus **bus)
@@ -86,25 +93,26 @@ struct lw_bus_scene lw_program_scene(const struct lw_program *program)
                                  .yaml = program->yaml};
 }
 
-void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, int64_t *due_ns)
+void lw_program_announce(struct lw_program *program, struct lw_bus *bus, int64_t *due_ns)
 {
     const int64_t now_ns = lw_clock_mono_ns();
     if (now_ns < *due_ns)
         return;
     *due_ns = now_ns + LW_NS_PER_S;
     const struct lw_bus_scene scene = lw_program_scene(program);
-    if (lw_bus_publish_scene(bus, &scene) != LW_OK)
-        lw_program_say(program, "SCENE could not be sent; a log may lack it");
+    lw_program_say_sent(program, "SCENE", lw_bus_publish_scene(bus, &scene) == LW_OK, &program->no_scene);
 }
 
-enum lw_status lw_program_report(const struct lw_program *program, struct lw_bus *bus, struct lw_health *health,
-                                 struct lw_report *report)
+void lw_program_report(struct lw_program *program, struct lw_bus *bus, struct lw_health *health,
+                       struct lw_report *report)
 {
+    const enum lw_channel channel = program->is_simulator ? LW_CHANNEL_PLANT_STATUS : LW_CHANNEL_STATUS;
     union lw_message message;
     report->realtime = program->realtime;
     lw_health_report(health, &program->refusals, report);
     message.report = *report;
-    return lw_bus_publish(bus, program->is_simulator ? LW_CHANNEL_PLANT_STATUS : LW_CHANNEL_STATUS, &message);
+    const bool sent = lw_bus_publish(bus, channel, &message) == LW_OK;
+    lw_program_say_sent(program, lw_wire_channel_name(channel), sent, &program->no_status);
 }
 
 bool lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health)

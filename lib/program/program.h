@@ -43,7 +43,8 @@ struct lw_program {
     const char *histogram;  // file for statistics at the end, NULL = none
     struct lw_bus_config bus_config;
 
-    unsigned realtime; // set of enum lw_realtime: what the system granted
+    unsigned realtime;        // set of enum lw_realtime: what the system granted
+    bool no_scene, no_status; // SCENE, STATUS or PLANT_STATUS cannot be sent for the moment
     struct lw_refusals refusals;
 
     // From the scene file and --set.
@@ -58,6 +59,10 @@ void lw_program_start(struct lw_program *program, int argc, char **argv);
 void lw_program_say(const struct lw_program *program, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void lw_program_fail(const struct lw_program *program, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+// Says that a channel's messages cannot be sent, once until they can: who reads stderr slowly must not hold us up.
+//   failing  in/out  whether the message before failed; false at first
+void lw_program_say_sent(const struct lw_program *program, const char *channel, bool sent, bool *failing);
+
 // Opens a bus connection to publish on, one to receive on as --transport says, or subscribes on one; says why not.
 LW_MUST_CHECK enum lw_status lw_program_open(const struct lw_program *program, struct lw_bus **bus);
 LW_MUST_CHECK enum lw_status lw_program_open_stream(const struct lw_program *program, struct lw_bus **bus);
@@ -69,7 +74,7 @@ struct lw_bus_scene lw_program_scene(const struct lw_program *program);
 
 // Publishes the scene in force on SCENE, for the log, when a second has passed since it did so last.
 //   due_ns  in/out  CLOCK_MONOTONIC of the next time; 0 = now
-void lw_program_announce(const struct lw_program *program, struct lw_bus *bus, int64_t *due_ns);
+void lw_program_announce(struct lw_program *program, struct lw_bus *bus, int64_t *due_ns);
 
 // Asks the system for all that keeps time, before any thread starts: memory locked and kept, CPUs kept awake,
 // SCHED_FIFO and the CPU asked for. Says what it refuses; false when the user required it.
@@ -79,10 +84,10 @@ LW_MUST_CHECK bool lw_program_go_realtime(struct lw_program *program);
 void lw_program_realtime_thread(const struct lw_program *program, int behind);
 void lw_program_normal_thread(void);
 
-// Publishes what a program's health is on its channel, 20 times a second.
+// Publishes what a program's health is on its channel, 20 times a second; says so when it cannot.
 //   report  in  state, distance and faults of its own; the rest is filled in
-LW_MUST_CHECK enum lw_status lw_program_report(const struct lw_program *program, struct lw_bus *bus,
-                                               struct lw_health *health, struct lw_report *report);
+void lw_program_report(struct lw_program *program, struct lw_bus *bus, struct lw_health *health,
+                       struct lw_report *report);
 
 // Writes the statistics asked for by --histogram; false, and it says why, when it cannot.
 LW_MUST_CHECK bool lw_program_write_histogram(const struct lw_program *program, const struct lw_health *health);

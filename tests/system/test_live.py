@@ -269,6 +269,36 @@ def test_words_that_nobody_reads_end_no_program(root):
             simulator.kill()
 
 
+def test_what_cannot_be_sent_is_said_once(root):
+    # Words for every message fill a pipe that nobody empties, and then no signal is heard any more.
+    scene = root / "scenarios" / "reach.yaml"
+    with (
+        running("leeway-simulator", scene) as simulator,
+        running("leeway-controller", scene, "--post-mortem=none") as controller,
+    ):
+        listener = Listener()
+        listener.wait_for("JOINT_STATE", _moving)
+        _ip("link set lo down")
+        try:
+            time.sleep(1)  # 20 messages
+        finally:
+            for command in ("link set lo up", "link set lo multicast on"):
+                _ip(command)
+            _ip("route replace 224.0.0.0/4 dev lo")
+        listener.wait_for("JOINT_STATE", lambda s: s.plant_mode == s.MOVING)
+        for channel in ("STATUS", "PLANT_STATUS"):
+            listener.wait_for(channel, lambda s: s.unsent > 0)
+        for process, channel in ((controller, "STATUS"), (simulator, "PLANT_STATUS")):
+            process.terminate()
+            said = process.communicate(timeout=5)[1].splitlines()
+            for words in ("cannot be sent", "is sent again"):
+                assert sum(line.endswith(f": {channel} {words}") for line in said) == 1, said
+
+
+def _ip(arguments):
+    subprocess.run(["ip", *arguments.split()], check=True)
+
+
 def test_statistics_that_cannot_be_written_are_a_failure(root):
     scene = root / "scenarios" / "reach.yaml"
     with running("leeway-controller", scene, "--histogram=/dev/full") as controller:
