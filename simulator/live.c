@@ -37,7 +37,7 @@ struct live {
     struct lw_mailbox command_box; // rx -> rt: struct arrival
     _Alignas(LW_CACHE_LINE) struct arrival command_slots[LW_MAILBOX_SLOTS];
     struct lw_health health;       // rt -> main
-    struct lw_gate gate;           // rx
+    struct lw_gate gate;           // rt -> rx: set before the first state
     struct lw_lease lease;         // rx
     atomic_int_fast64_t state_seq; // rt -> rx: newest state published, or just being published
     atomic_bool stopping;          // main -> rt: ramp to rest, then end
@@ -54,7 +54,8 @@ static void on_command(void *user, enum lw_channel channel, const union lw_messa
     struct live *live = user;
     const int64_t now_ns = lw_clock_mono_ns(), state_seq = atomic_load(&live->state_seq);
     const enum lw_verdict verdict =
-        lw_gate_judge(&live->gate, &live->lease, &message->joint_command, state_seq, now_ns);
+        state_seq == 0 ? LW_REFUSED_GUARD
+                       : lw_gate_judge(&live->gate, &live->lease, &message->joint_command, state_seq, now_ns);
     if (!lw_refusals_note(&live->simulation->program->refusals, verdict))
         return;
     struct arrival *slot = lw_mailbox_slot(&live->command_box);
@@ -131,6 +132,8 @@ static void *run_plant(void *user)
     lw_program_realtime_thread(s->program, 0);
     loop.live = live;
     loop.start_ns = lw_clock_mono_ns();
+    // Now, not when the set-up began: that may have taken longer than the gate stays shut.
+    live->gate = lw_simulation_gate(s);
     loop.periodic = lw_periodic_start(loop.start_ns + s->plant.period_ns, s->plant.period_ns);
 
     // When done, wait out one controller period so that the last state is answered too.
@@ -273,7 +276,6 @@ int lw_simulation_live(struct lw_simulation *simulation)
     static struct live live;
     struct lw_program *program = simulation->program;
     live.simulation = simulation;
-    live.gate = lw_simulation_gate(simulation);
     lw_mailbox_init(&live.command_box, live.command_slots, sizeof live.command_slots[0]);
     if (!lw_program_go_realtime(program))
         return EXIT_FAILURE;
