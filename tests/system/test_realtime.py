@@ -50,8 +50,10 @@ def test_limits_are_kept_and_used(root, tmp_path):
     # Never slower than required: a command that is not the wish has a joint at a bound.
     commands = [c for c in read(log, "JOINT_COMMAND") if c.mode == c.VELOCITY]
     command = np.array([c.qd for c in commands])
-    # A stop request wishes rest.
-    wish = np.array([np.zeros(6) if c.flags & c.STOPPED else c.qd_law for c in commands])
+    # A stop request wishes rest, and so does a plant that has ended.
+    wish = np.array(
+        [np.zeros(6) if c.flags & (c.STOPPED | c.STALE) else c.qd_law for c in commands]
+    )
     assert len(commands) > 1500
     before, command, wish = command[:-1], command[1:], wish[1:]
     short = np.abs(command - wish).max(axis=1) > 1e-12
