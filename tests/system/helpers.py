@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -83,10 +83,10 @@ def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None
 class Listener:
     """Newest message of each channel, read when asked."""
 
-    def __init__(self) -> None:
-        self.bus = lcm.LCM(resolve_url(None))
+    def __init__(self, url: str | None = None, channels: Iterable[str] = TYPES) -> None:
+        self.bus = lcm.LCM(resolve_url(url))
         self.newest: dict[str, Any] = {}
-        for channel in TYPES:
+        for channel in channels:
             self.bus.subscribe(channel, self._on_message)
 
     def _on_message(self, channel: str, data: bytes) -> None:
