@@ -60,6 +60,16 @@ void make_mix(struct malformer *m, struct packet *out)
 
 // --- the pace ---
 
+// The hexadecimal number behind one of a line's colons, counted from 0; 0 when there is none.
+static unsigned long behind_colon(const char *line, int colon)
+{
+    for (; line != NULL && colon >= 0; colon--) {
+        line = strchr(line, ':');
+        line = line != NULL ? line + 1 : NULL;
+    }
+    return line != NULL ? strtoul(line, NULL, 16) : 0;
+}
+
 // Bytes that the slowest listener has not read yet.
 static unsigned long longest_queue(void)
 {
@@ -67,10 +77,9 @@ static unsigned long longest_queue(void)
     unsigned long longest = 0;
     char line[256];
     while (file != NULL && fgets(line, sizeof line, file) != NULL) {
-        unsigned port = 0;
-        unsigned long queue = 0;
-        // number: local address:port, remote, state, send queue:receive queue
-        if (sscanf(line, " %*d: %*x:%x %*x:%*x %*x %*x:%lx", &port, &queue) == 2 && port == PORT && queue > longest)
+        // number: local address:port, remote address:port, state, send queue:receive queue
+        const unsigned long port = behind_colon(line, 1), queue = behind_colon(line, 3);
+        if (port == PORT && queue > longest)
             longest = queue;
     }
     if (file != NULL)
