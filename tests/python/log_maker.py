@@ -67,6 +67,17 @@ def scene(session: int, program: str = "leeway-controller", **fields: str) -> An
     return m
 
 
+def status(session: int, mono_ns: int, ticks: int = 500, **fields: Any) -> Any:
+    """Return a status_t of a program that runs well, seconds after its start."""
+    m = stamp(wire.status_t(), session, 1 + mono_ns // PERIOD_NS, mono_ns)
+    m.state, m.realtime, m.period_ns, m.ticks = m.RUNNING, m.FIFO | m.LOCKED, PERIOD_NS, ticks
+    m.wake_late_ns, m.exec_ns = [20_000, 40_000, 60_000, 80_000], [30_000, 50_000, 70_000, 90_000]
+    m.age_ns, m.allocations, m.distance = [4_000_000] * 4, -1, -1.0
+    for name, value in fields.items():
+        setattr(m, name, value)
+    return m
+
+
 class Run:
     """A run of some ticks at constant joint speed, to be changed by a test before it is written.
 
@@ -106,6 +117,24 @@ class Run:
         m.distance = float(np.linalg.norm(origins - [1, 1, 0.4], axis=1).min())
         m.deviation = float(np.linalg.norm(origins[-1] - m.goal))
         return m
+
+    def tell(self, **faults: dict[int, int]) -> dict[str, list[Any]]:
+        """Let both programs tell STATUS every 6th tick, 48 ms; return the messages by channel.
+
+        Parameters
+        ----------
+        faults
+            By channel: tick from which on a set of faults is told, and that set.
+        """
+        told: dict[str, list[Any]] = {}
+        for name, session in (("STATUS", CONTROLLER), ("PLANT_STATUS", PLANT)):
+            in_force = 0
+            for k in range(0, len(self.commands), 6):
+                in_force = faults.get(name, {}).get(k, in_force)
+                m = status(session, k * PERIOD_NS + PERIOD_NS // 2, 500 + k, faults=in_force)
+                self.inserted.setdefault(k, []).append((name, m))
+                told.setdefault(name, []).append(m)
+        return told
 
     def messages(self) -> list[tuple[str, Any]]:
         """Return all messages in order."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from leeway_lcm import leeway as wire
-from log_maker import CONTROLLER, PLANT, Run, event, obstacles, scene, stamp
+from log_maker import CONTROLLER, PLANT, Run, event, obstacles, scene, stamp, status
 
 from leeway.logs.log import Log, LogError, read_log, read_tables
 
@@ -33,21 +34,33 @@ def refusal(folder: Path, data: bytes, name: str | None = None) -> str:
     return text
 
 
-def test_columns_hold_every_field_of_the_wire(tmp_path: Path) -> None:
-    command = stamp(wire.joint_command_t(), 5, 6, 7)
-    for number, name in enumerate(command.__slots__[1:], start=1):
-        old = getattr(command, name)
+@pytest.mark.parametrize(
+    ("channel", "field", "kind"),
+    [
+        ("JOINT_COMMAND", "commands", wire.joint_command_t),
+        ("STATUS", "statuses", wire.status_t),
+        ("PLANT_STATUS", "plant_statuses", wire.status_t),
+    ],
+)
+def test_columns_hold_every_field_of_the_wire(
+    tmp_path: Path, channel: str, field: str, kind: Any
+) -> None:
+    message = stamp(kind(), 5, 6, 7)
+    for number, name in enumerate(message.__slots__[1:], start=1):
+        old = getattr(message, name)
+        step = 1 / 8 if isinstance(old, list) and isinstance(old[0], float) else 1
         setattr(
-            command,
+            message,
             name,
-            [number + i / 8 for i in range(len(old))] if isinstance(old, list) else number,
+            [number + i * step for i in range(len(old))] if isinstance(old, list) else number,
         )
-    command.mode = command.VELOCITY  # the only field with few values
-    log = read_bytes(tmp_path, WHOLE.data() + event("JOINT_COMMAND", command.encode()))
-    row = log.commands.take(np.array([len(log.commands) - 1]))
+    if channel == "JOINT_COMMAND":
+        message.mode = message.VELOCITY  # the only field with few values
+    table = getattr(read_bytes(tmp_path, WHOLE.data() + event(channel, message.encode())), field)
+    row = table.take(np.array([len(table) - 1]))
     assert (row.session[0], row.seq[0], row.mono_ns[0], row.utime[0]) == (5, 6, 7, 7)
-    for name in command.__slots__[1:]:
-        assert np.array_equal(np.ravel(getattr(row, name)), np.ravel(getattr(command, name))), name
+    for name in message.__slots__[1:]:
+        assert np.array_equal(getattr(row, name)[0], getattr(message, name)), name
 
 
 def test_all_kinds_of_messages_are_read(tmp_path: Path) -> None:
@@ -161,6 +174,23 @@ def test_robots_are_told_apart_by_prefix(tmp_path: Path) -> None:
     assert "found one without a name" in refusal(tmp_path, WHOLE.data(), "ARM1")
 
 
+def test_status_and_world_are_read_by_robot_and_may_be_missing(tmp_path: Path) -> None:
+    for prefix, name in (("", None), ("ARM1_", "ARM1"), ("PLANT_2_", "PLANT_2")):
+        run = Run(ticks=13)
+        run.tell()
+        run.before.append(("WORLD", obstacles(CONTROLLER, 1, 2, [(1, (1.0, 1.0, 0.4), 0.0)])))
+        stranger = event("OTHER_STATUS", status(99, 0).encode())
+        cut = event(prefix + "STATUS", status(CONTROLLER, 0).encode()[:-1])
+        log = read_bytes(tmp_path, run.data(prefix) + stranger + cut, name)
+        assert log.statuses.session.tolist() == [CONTROLLER] * 3
+        assert log.plant_statuses.session.tolist() == [PLANT] * 3
+        assert (log.statuses.refused.shape, log.statuses.age_ns.shape) == ((3, 16), (3, 4))
+        assert log.statuses.ticks.tolist() == [500, 506, 512]
+        assert log.worlds.id[:, 0].tolist() == [1]
+        assert (log.counts[prefix + "WORLD"], log.undecodable) == (1, {prefix + "STATUS": 1})
+    assert len(read_bytes(tmp_path, WHOLE.data()).statuses) == 0
+
+
 def test_lengths_that_lie_are_not_believed(tmp_path: Path) -> None:
     head = struct.pack(">IqqII", 0xEDA1DA01, 0, 0, 0xFFFFFFFF, 0xFFFFFFFF)
     assert read_bytes(tmp_path, WHOLE.data() + head + b"x" * 50).truncated == FRAME + 50
@@ -172,7 +202,10 @@ PIECES = st.one_of(
     st.builds(
         event,
         st.sampled_from(
-            ["JOINT_STATE", "A_JOINT_COMMAND", "SCENE", "OBSTACLES", "GOAL", "STOP", "_STOP", ""]
+            [
+                *("JOINT_STATE", "A_JOINT_COMMAND", "SCENE", "OBSTACLES", "GOAL", "STOP", "_STOP"),
+                *("STATUS", "A_PLANT_STATUS", "WORLD", ""),
+            ]
         ),
         st.binary(max_size=80),
     ),

@@ -29,7 +29,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _FINGERPRINT = 8  # bytes
-_ROBOT_CHANNEL = re.compile(r"(?:(.+)_)?(JOINT_STATE|JOINT_COMMAND|GOAL|STOP|SCENE)")
+_ROBOT_CHANNEL = re.compile(
+    r"(?:(.+)_)?(JOINT_STATE|JOINT_COMMAND|GOAL|STOP|SCENE|WORLD|STATUS|PLANT_STATUS)"
+)
 _SCALARS = {"int8_t": ">i1", "int32_t": ">i4", "int64_t": ">i8", "double": ">f8"}
 _FIXED = {
     "JOINT_STATE": wire.joint_state_t,
@@ -37,6 +39,9 @@ _FIXED = {
     "OBSTACLES": wire.obstacles_t,
     "GOAL": wire.goal_t,
     "STOP": wire.stop_t,
+    "WORLD": wire.obstacles_t,
+    "STATUS": wire.status_t,
+    "PLANT_STATUS": wire.status_t,
 }
 
 
@@ -138,6 +143,33 @@ class Stops(Messages):
 
 
 @dataclass(frozen=True)
+class Statuses(Messages):
+    """STATUS, PLANT_STATUS: fields of status_t; refused is (n, 16), percentiles are (n, 4)."""
+
+    state: Ints
+    faults: Ints
+    faults_ever: Ints
+    realtime: Ints
+    period_ns: Ints
+    ticks: Ints
+    skipped: Ints
+    stale_ticks: Ints
+    unsent: Ints
+    peer_session: Ints
+    taken: Ints
+    missed: Ints
+    takeovers: Ints
+    refused: Ints
+    wake_late_ns: Ints
+    exec_ns: Ints
+    age_ns: Ints
+    minor_faults: Ints
+    major_faults: Ints
+    allocations: Ints
+    distance: Floats
+
+
+@dataclass(frozen=True)
 class SceneMessage:
     """SCENE: what a program says that it runs."""
 
@@ -195,6 +227,9 @@ class Log:
     obstacles: Obstacles
     goals: Goals
     stops: Stops
+    worlds: Obstacles  # WORLD: the obstacles as the controller tells them
+    statuses: Statuses  # of controllers
+    plant_statuses: Statuses  # of simulators
 
 
 def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
@@ -236,6 +271,9 @@ def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
         obstacles=_columns(by_name["OBSTACLES"], Obstacles),
         goals=_columns(by_name["GOAL"], Goals),
         stops=_columns(by_name["STOP"], Stops),
+        worlds=_columns(by_name["WORLD"], Obstacles),
+        statuses=_columns(by_name["STATUS"], Statuses),
+        plant_statuses=_columns(by_name["PLANT_STATUS"], Statuses),
     )
 
 
