@@ -20,6 +20,7 @@ from leeway.logs.events import Event, list_events
 from leeway.logs.limits import LimitUse, limit_uses
 from leeway.logs.log import Commands, Floats, Ints, Log, LogError, SceneMessage
 from leeway.logs.motion import select_motion
+from leeway.logs.programs import Program, list_programs
 from leeway.logs.world import WorldLine, follow, nearest
 
 FLAGS = {
@@ -30,6 +31,8 @@ FLAGS = {
     "stale": 16,
     "not_finite": 32,
     "waiting": 64,
+    "foreign": 128,
+    "warming_up": 256,
 }
 MOVING_POINTS = slice(1, 6)  # point 1 lies on axis 1 and never moves
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
@@ -88,6 +91,8 @@ class Analysis:
     distance_check: float  # m, largest difference between distances here and in the commands
     late_ticks: int  # periods that the controller skipped during the motion
     losses: dict[str, int]
+    post_mortem: bool  # written by the controller after a fault: no recorder's log
+    programs: list[Program]  # of the motion; empty when the log has no STATUS of them
     events: list[Event] = field(default_factory=list)
 
     @property
@@ -131,6 +136,13 @@ class Analysis:
         return {name: float(np.mean((self.flags & bit) != 0)) for name, bit in FLAGS.items()}
 
     @property
+    def why_no_programs(self) -> str:
+        """Why `programs` is empty."""
+        if self.mode == "lockstep":
+            return "in lockstep the programs tell no STATUS"
+        return f"no STATUS of them in this {'post-mortem ' if self.post_mortem else ''}log"
+
+    @property
     def timing(self) -> dict[str, dict[str, float]]:
         """Percentiles in us of wake lateness, execution and state age; empty in lockstep."""
         if self.mode == "lockstep":
@@ -169,6 +181,8 @@ class Analysis:
             "flag_shares": self.flag_shares,
             "timing": self.timing,
             "losses": self.losses,
+            "post_mortem": self.post_mortem,
+            "programs": [program.to_json() for program in self.programs],
             "truncated_bytes": self.truncated_bytes,
             "counts": self.counts,
             "undecodable": self.undecodable,
@@ -244,6 +258,8 @@ def analyse(log: Log) -> Analysis:
         distance_check=_compare(distances, commands.distance),
         late_ticks=0 if lockstep else int(commands.skipped[-1] - commands.skipped[0]),
         losses=motion.losses | {"worlds_unknown": line.unknown_ticks},
+        post_mortem=motion.post_mortem,
+        programs=list_programs(log, motion),
         events=events,
     )
 

@@ -10,12 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from leeway.logs.log import Floats, Log, Messages
-from leeway.logs.motion import MOVING, STOPPING, Motion
+from leeway.logs.log import Floats, Ints, Log, Messages, Statuses
+from leeway.logs.motion import ENDED, HOLD, MOVING, STOPPING, Motion
+from leeway.logs.programs import statuses_of
 from leeway.logs.world import Obstacle, World, WorldLine
+from leeway.status import fault_names
 
-STOPPED, STALE, NOT_FINITE = 8, 16, 32
+STOPPED, STALE, NOT_FINITE, FOREIGN = 8, 16, 32, 128
+BEFORE, DURING, AFTER = range(3)  # the motion
 _OTHERS_SHOWN = 10  # other sessions of controllers or of plants that are events of their own
+FAULT_S = 1.0  # a status tells the faults of the second before it
 MERGE_S = 0.5  # moves of an obstacle that follow one another this closely are one event
 
 
@@ -24,7 +28,7 @@ class Event:
     """One thing that happened."""
 
     t: float  # s of motion; below 0 or beyond the end for what happened outside of it
-    kind: str  # start, obstacle, goal, stop, stale, plant, restart, end, log
+    kind: str  # start, obstacle, goal, stop, stale, foreign, fault, plant, restart, end, log
     text: str
 
 
@@ -40,18 +44,15 @@ def list_events(
     duration
         Length of the scene, s.
     """
-    sources = {scene.session: scene.program for scene in log.scenes}
-    events = [
-        Event(
-            float(motion.t[0]),
-            "start",
-            f"motion starts: first command obeyed, goal {_point(goal[0])}",
-        )
-    ]
+    sources = {motion.plant: "the plant"} | {s.session: s.program for s in log.scenes}
+    events = list(_beginning(motion, goal))
     events += _obstacle_events(motion.t, line, sources)
     events += _goal_events(log, motion, goal)
     events += _flag_events(motion)
     events += _plant_events(motion)
+    for program, statuses in statuses_of(log, motion).items():
+        events += _fault_events(program, statuses, motion)
+        events += _takeovers(program, statuses, motion)
     events += _restarts(log, motion)
     events += _ending(motion, duration)
     events.sort(key=lambda event: event.t)
@@ -63,6 +64,21 @@ def list_events(
             )
         )
     return events
+
+
+def _beginning(motion: Motion, goal: Floats) -> Iterator[Event]:
+    """Yield what kind of log it is when it is no recorder's, and how the motion starts."""
+    start, heard = float(motion.t[0]), motion.heard
+    if motion.post_mortem:
+        begin = motion.times_of(motion.before.mono_ns[:1]).min(initial=start)
+        text = "post-mortem log: what the controller was given and commanded around a fault"
+        yield Event(float(begin), "log", text)
+    what = "motion starts: first command obeyed"
+    if not motion.obeyed:
+        what = "first command that asks for motion; the plant obeyed none"
+    elif heard.command_session[0] == motion.controller and heard.plant_mode[0] != HOLD:
+        what = f"the log starts in mid-motion, at tick {motion.commands.tick[0]} of the controller"
+    yield Event(start, "start", f"{what}, goal {_point(goal[0])}")
 
 
 def _point(p: Floats | tuple[float, float, float]) -> str:
@@ -161,14 +177,23 @@ def _spans(active: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int
 
 
 def _flag_events(motion: Motion) -> Iterator[Event]:
+    """Yield what braked the arm during the motion; also before or after it where that is news."""
+    parts = (motion.before, motion.commands, motion.after)
+    flags: Ints = np.concatenate([part.flags for part in parts])
+    t = np.concatenate(
+        [motion.times_of(motion.before.mono_ns), motion.t, motion.times_of(motion.after.mono_ns)]
+    )
+    where = np.repeat(np.arange(3), [len(part) for part in parts])
+    alone = () if motion.ended else (AFTER,)
     kinds = {
-        STOPPED: ("stop", "stop request obeyed: braked to rest"),
-        STALE: ("stale", "no fresh joint state: braked"),
-        NOT_FINITE: ("stale", "a value was no number: braked"),
+        STOPPED: ("stop", "stop request obeyed: braked to rest", (DURING,)),
+        STALE: ("stale", "no fresh joint state: braked", (DURING, *alone)),
+        NOT_FINITE: ("stale", "a value was no number: braked", (DURING,)),
+        FOREIGN: ("foreign", "another controller commands the plant", (BEFORE, DURING, AFTER)),
     }
-    for bit, (kind, text) in kinds.items():
-        for first, last in _spans((motion.commands.flags & bit) != 0):
-            start, end = float(motion.t[first]), float(motion.t[last])
+    for bit, (kind, text, told) in kinds.items():
+        for first, last in _spans((flags & bit != 0) & np.isin(where, told)):
+            start, end = float(t[first]), float(t[last])
             yield Event(start, kind, f"{text}, {last - first + 1} ticks until {end:.3f} s")
 
 
@@ -179,13 +204,47 @@ def _plant_events(motion: Motion) -> Iterator[Event]:
     """Yield when commands ceased for the plant, and when it obeyed again."""
     mode = motion.states.plant_mode
     for first, last in _spans(mode == STOPPING):
-        at_end = last == len(mode) - 1
+        at_end = last == len(mode) - 1 or mode[last + 1] == ENDED
         again = "" if at_end else f"; commands again at {float(motion.plant_t[last + 1]):.3f} s"
         yield Event(
             float(motion.plant_t[first]),
             "plant",
             f"commands ceased: the plant ramps to rest{again}",
         )
+    left = motion.heard.tick[motion.heard.plant_mode == ENDED]
+    if len(left):
+        yield Event(int(left[0]) * motion.plant_period, "plant", "the plant ended in good order")
+
+
+def _fault_events(program: str, statuses: Statuses, motion: Motion) -> Iterator[Event]:
+    """Yield each fault of a program when it appears, with the time of the last message with it.
+
+    A message tells faults of the second before it, so spans closer than that are one.
+    """
+    t = motion.times_of(statuses.mono_ns)
+    for bit in (1 << place for place in range(32)):
+        for first, last in _joined(_spans(statuses.faults & bit != 0), t):
+            (name,) = fault_names(bit)
+            until = "to its last message" if last == len(t) - 1 else f"until {t[last]:.3f} s"
+            yield Event(float(t[first]), "fault", f"{program}: {name} {until}")
+
+
+def _joined(spans: list[tuple[int, int]], t: Floats) -> list[tuple[int, int]]:
+    """Return spans of rows, those as one that follow one another within a second."""
+    joined: list[tuple[int, int]] = []
+    for first, last in spans:
+        if joined and t[first] - t[joined[-1][1]] <= FAULT_S:
+            first = joined.pop()[0]
+        joined.append((first, last))
+    return joined
+
+
+def _takeovers(program: str, statuses: Statuses, motion: Motion) -> Iterator[Event]:
+    """Yield when another session took the place of the other side's program."""
+    other = {"controller": "plant", "simulator": "controller"}[program]
+    for row in np.flatnonzero(np.diff(statuses.takeovers) > 0) + 1:
+        text = f"{program}: another {other} took over, session {statuses.peer_session[row]}"
+        yield Event(motion.time_of(int(statuses.mono_ns[row])), "restart", text)
 
 
 def _restarts(log: Log, motion: Motion) -> Iterator[Event]:
@@ -213,9 +272,11 @@ def _ending(motion: Motion, duration: float) -> Iterator[Event]:
         )
     elif end >= duration - motion.period / 2:
         yield Event(end, "end", f"end of the scene: {duration:g} s of motion")
-    elif motion.commands_after:
+    elif len(motion.after) and motion.ended:
+        yield Event(end, "end", f"joint states end {duration - end:.3f} s before the scene does")
+    elif len(motion.after):
         text = f"joint states end {duration - end:.3f} s before the scene does: is the plant gone?"
-        yield Event(end, "end", f"{text} {motion.commands_after} commands follow")
+        yield Event(end, "end", f"{text} {len(motion.after)} commands follow")
     elif motion.states.plant_mode[-1] != MOVING:
         yield Event(end, "end", f"commands end {duration - end:.3f} s before the scene does")
     else:

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 
 from leeway.logs.log import Commands, Floats, Ints, Log, LogError, Messages, MessagesT, States
 
-HOLD, MOVING, STOPPING = range(3)
+HOLD, MOVING, STOPPING, ENDED = range(4)
 VELOCITY = 1
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Commands from the first that was accepted to the last that answers a new state."""
+    """Commands from the first that was accepted to the last that answers a new state.
+
+    In a log of a controller that was never obeyed they begin with its first command of motion.
+    """
 
     commands: Commands  # n ticks of one controller session, in its order
     states: States  # m states of one plant session from the start of motion on, one a plant tick
@@ -29,7 +32,9 @@ class Motion:
     period: float  # s, controller
     plant_period: float  # s
     losses: dict[str, int]
-    commands_after: int  # commands behind the last new state: braking without a plant
+    before: Commands  # of the same session, in front of `commands`, idle ones too
+    after: Commands  # of the same session, behind the last new state: braking without a plant
+    post_mortem: bool  # the log is one that the controller wrote after a fault
 
     @property
     def controller(self) -> int:
@@ -41,12 +46,27 @@ class Motion:
         """Session of the plant."""
         return int(self.states.session[0])
 
+    @property
+    def obeyed(self) -> bool:
+        """Whether the plant took any command of this controller."""
+        return self.controller in self.heard.command_session
+
+    @property
+    def ended(self) -> bool:
+        """Whether the plant took its leave."""
+        return ENDED in self.heard.plant_mode
+
     def time_of(self, mono_ns: int) -> float:
         """Return the time of motion, s, of a moment of this host's clock."""
+        return float(self.times_of(np.array([mono_ns]))[0])
+
+    def times_of(self, mono_ns: Ints) -> Floats:
+        """Return the times of motion, (k,) s, of moments of this host's clock, (k,) ns."""
         at = self.commands.mono_ns
-        inside = float(np.interp(mono_ns, at, self.t))
-        outside = min(mono_ns - int(at[0]), 0) + max(mono_ns - int(at[-1]), 0)
-        return inside + outside * 1e-9
+        inside = np.interp(mono_ns, at, self.t)
+        outside = np.minimum(mono_ns - at[0], 0) + np.maximum(mono_ns - at[-1], 0)
+        times: Floats = inside + outside * 1e-9
+        return times
 
 
 def select_motion(log: Log) -> Motion:
@@ -65,13 +85,15 @@ def select_motion(log: Log) -> Motion:
     commands, resent = _of_motion(sent, all_states, controller)
     new = np.flatnonzero(np.diff(commands.state_seq) > 0)
     end = int(new[-1]) + 2 if len(new) else 1
-    after = len(commands) - end
+    before = sent.take(sent.tick < commands.tick[0])
+    after = commands.take(np.arange(end, len(commands)))
     commands = commands.take(np.arange(end))
     period_ns = int(all_states.period_ns[0])
     plant_period = period_ns / 1e9
     states = all_states.take(_moving_part(all_states, int(commands.state_tick[0])))
     ratio = max(1, int(np.median(np.diff(commands.state_tick)))) if end > 1 else 1
-    losses = _losses(commands, all_states, ratio) | {"commands_sent_again": resent}
+    post_mortem = _is_post_mortem(log)
+    losses = _losses(commands, all_states, ratio, post_mortem) | {"commands_sent_again": resent}
     return Motion(
         commands=commands,
         states=states,
@@ -82,7 +104,9 @@ def select_motion(log: Log) -> Motion:
         period=ratio * plant_period,
         plant_period=plant_period,
         losses=losses,
-        commands_after=after,
+        before=before,
+        after=after,
+        post_mortem=post_mortem,
     )
 
 
@@ -93,18 +117,25 @@ def sessions_of(messages: Messages) -> list[int]:
 
 
 def _sessions(log: Log) -> tuple[int, int]:
-    """Return the newest plant session that moved and the newest controller that moved it."""
-    meant = np.unique(log.commands.plant_session)
-    known = log.states.take(np.isin(log.states.session, meant))
-    for plant in reversed(sessions_of(known)):
-        states = log.states.take((log.states.session == plant) & (log.states.plant_mode != HOLD))
-        obeyed = log.commands.take(
-            (log.commands.plant_session == plant)
-            & (log.commands.mode == VELOCITY)
-            & np.isin(log.commands.session, states.command_session)
+    """Return the newest plant session that moved and the newest controller that moved it.
+
+    When no controller in the log moved a plant: the newest that asked a moving plant to move.
+    """
+    known = log.states.take(np.isin(log.states.session, np.unique(log.commands.plant_session)))
+    for must_obey in (True, False):
+        for plant in reversed(sessions_of(known)):
+            moved = (log.states.session == plant) & (log.states.plant_mode != HOLD)
+            states = log.states.take(moved)
+            meant = (log.commands.plant_session == plant) & (log.commands.mode == VELOCITY)
+            if must_obey:
+                meant &= np.isin(log.commands.session, states.command_session)
+            if meant.any() and len(states) and states.period_ns.min() > 0:
+                return plant, sessions_of(log.commands.take(meant))[-1]
+    if len(log.states) and MOVING in log.states.plant_mode and VELOCITY not in log.commands.mode:
+        raise LogError(
+            f"{log.path}: no controller in it asked for motion: all {len(log.commands)} commands "
+            "are idle, and the arm was moved by another"
         )
-        if len(states) and len(obeyed) and states.period_ns.min() > 0:
-            return plant, sessions_of(obeyed)[-1]
     raise LogError(
         f"{log.path}: the arm never moved: no plant in it obeyed a command. A "
         "controller waits for JOINT_STATE and for one OBSTACLES message"
@@ -119,10 +150,10 @@ def _in_order(messages: MessagesT) -> MessagesT:
 def _of_motion(sent: Commands, states: States, controller: int) -> tuple[Commands, int]:
     """Return the commands from the first accepted one on, one a tick; count those sent again."""
     accepted = states.command_seq[states.command_session == controller]
-    first = int(accepted.min())
+    first = int(accepted.min(initial=np.iinfo(np.int64).max))
     plant = sent.plant_session == states.session[0]
     commands = sent.take(plant & (sent.mode == VELOCITY) & (sent.seq >= first))
-    if not len(commands):  # the log begins after the last command: only possible in odd cuts
+    if not len(commands):  # never obeyed, or the log begins after the last one that was
         commands = sent.take(plant & (sent.mode == VELOCITY))
     once = commands.take(np.unique(commands.tick, return_index=True)[1])
     return once, len(commands) - len(once)
@@ -145,16 +176,34 @@ def _acceleration(states: States, period: float) -> Floats:
     return out
 
 
-def _losses(commands: Commands, states: States, ratio: int) -> dict[str, int]:
-    """Count what is missing, by the messages' own numbers."""
+def _is_post_mortem(log: Log) -> bool:
+    """Return whether the controller wrote this log after a fault.
+
+    Such a log has one SCENE, of its only controller, no STATUS, and of the plant the states that
+    the controller used and no other. A recorder hears more.
+    """
+    only = [scene.session for scene in log.scenes] == sessions_of(log.commands)
+    silent = len(log.statuses) + len(log.plant_statuses) == 0
+    return only and silent and bool(np.isin(log.states.seq, log.commands.state_seq).all())
+
+
+def _losses(commands: Commands, states: States, ratio: int, post_mortem: bool) -> dict[str, int]:
+    """Count what is missing, by the messages' own numbers.
+
+    A post-mortem log lacks the states that were not used, which is no loss; what they echoed is
+    not known.
+    """
     used = np.diff(commands.state_seq)
-    obeyed = states.command_seq[states.command_session == commands.session[0]]
+    own = states.take(states.command_session == commands.session[0])
+    passed = np.maximum(np.diff(own.command_seq) - 1, 0)
+    if post_mortem:
+        passed = passed[np.diff(own.seq) == 1]
     return {
         "commands_not_in_log": _gaps(commands.seq),
-        "states_not_in_log": _gaps(states.seq),
+        "states_not_in_log": 0 if post_mortem else _gaps(states.seq),
         "states_not_used": int(np.maximum(used - ratio, 0).sum()),
         "states_used_again": int((used == 0).sum()),
-        "commands_not_obeyed": _gaps(obeyed),
+        "commands_not_obeyed": int(passed.sum()),
     }
 
 
