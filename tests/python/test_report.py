@@ -16,11 +16,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_maker import CONTROLLER, SOURCE, Run, obstacles, scene
+from typer.testing import CliRunner
 
+from leeway.cli import app
 from leeway.logs.analysis import Analysis, analyse
 from leeway.logs.log import read_log
 from leeway.report import write_report
-from leeway.report.figures import deviation, joint_positions, marked_events, reduce_minmax, timing
+from leeway.report.figures import (
+    deviation,
+    joint_positions,
+    marked_events,
+    program_times,
+    reduce_minmax,
+    timing,
+)
 
 PICTURES = {"pose", "q", "qd", "deviation", "distance", "limits", "timing"}
 
@@ -114,6 +123,25 @@ def test_lockstep_has_no_timing_picture(tmp_path: Path) -> None:
     assert timing(analysed(tmp_path)) is not None
 
 
+def test_times_of_the_programs_are_drawn_from_status(tmp_path: Path) -> None:
+    run = Run()
+    told = run.tell(STATUS={24: 2})
+    told["STATUS"][5].wake_late_ns = [20_000, 777_000, 900_000, 900_000]
+    told["PLANT_STATUS"][0].age_ns = [0] * 4  # nothing was expected yet
+    a = analysed(tmp_path, run)
+    figure = program_times(a)
+    assert figure is not None
+    controller, simulator = figure.axes
+    lines = {str(line.get_label()): line for line in controller.lines}
+    assert lines["wake-up late"].get_ydata().tolist() == [40.0] * 5 + [777.0] + [40.0] * 3
+    assert np.isnan(simulator.lines[2].get_ydata()[0])
+    assert controller.get_ylim()[1] > 4000
+    number = next(k for k, e in enumerate(a.events, start=1) if e.kind == "fault")
+    assert [text.get_text() for text in controller.texts] == [str(number)]
+    assert program_times(analysed(tmp_path)) is None
+    assert program_times(analysed(tmp_path, run, mode="lockstep")) is None
+
+
 # --- page ---
 
 
@@ -160,6 +188,39 @@ def test_page_is_self_contained_and_whole(tmp_path: Path) -> None:
     assert str(tmp_path) not in html
     assert f"{a.final_deviation:.4f}" in html
     assert "end of the scene" in html
+
+
+def test_programs_have_a_row_each_in_the_page_and_in_info(tmp_path: Path) -> None:
+    run = Run()
+    last = run.tell()["STATUS"][-1]
+    last.faults_ever, last.refused[last.OTHER_PLANT], last.skipped = last.PEER_TIMEOUT, 47, 31
+    a = analysed(tmp_path, run)
+    html = write_report([a], tmp_path / "out").read_text(encoding="utf-8")
+    table = html[html.index("<h3>Programs") : html.index("<h3>Limits")]
+    assert table.count("<tr>") == 3
+    for words in ("<td>controller<", "<td>simulator<", "peer timeout", "47 other plant", "31 skip"):
+        assert words in table
+    assert (tmp_path / "out" / "test_programs.png").exists()
+    assert 'alt="test: lateness, execution and age of input over time"' in html
+    shown = CliRunner().invoke(app, ["info", str(a.path)]).stdout
+    assert "controller             running, 125 Hz, real time fifo, locked" in shown
+    assert "faults ever peer_timeout" in shown
+    assert "skipped 31" in shown
+    assert "refused other_plant 47" in shown
+    assert "wake_late 20 / 40 / 60 / 80" in shown
+
+
+@pytest.mark.parametrize(
+    ("mode", "why"),
+    [
+        ("realtime", "no STATUS of them in this log"),
+        ("lockstep", "in lockstep the programs tell no STATUS"),
+    ],
+)
+def test_programs_that_told_nothing_are_no_table(tmp_path: Path, mode: str, why: str) -> None:
+    a = analysed(tmp_path, mode=mode)
+    assert why in write_report([a], tmp_path / "out").read_text(encoding="utf-8")
+    assert why in CliRunner().invoke(app, ["info", str(a.path)]).stdout
 
 
 def test_names_from_a_log_cannot_become_markup(tmp_path: Path) -> None:

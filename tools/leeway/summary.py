@@ -93,17 +93,52 @@ def print_info(analysis: Any) -> None:
     """Print all numbers of a run, then its events."""
     console = Console(highlight=False)
     for key, value in analysis.to_json().items():
-        if key not in ("events", "scene", "limits"):
+        if key not in ("events", "scene", "limits", "programs"):
             console.print(f"{key:24} {_short(value)}", soft_wrap=True, markup=False)
     console.print("limits", style="bold")
     for use in analysis.limits:
         text = f"{use.share:.1%} used, joint {use.joint} at {use.t:.3f} s" if use.on else "off"
         console.print(f"  {use.key:22} {text}", soft_wrap=True, markup=False)
+    _print_programs(console, analysis)
     console.print("events", style="bold")
     for event in analysis.events:
         console.print(
             f"  {event.t:8.3f} s  {event.kind:12} {event.text}", soft_wrap=True, markup=False
         )
+
+
+def _print_programs(console: Console, analysis: Any) -> None:
+    """Print two lines for each program: its counts, and its worst times."""
+    console.print("programs", style="bold")
+    if not analysis.programs:
+        console.print(f"  {analysis.why_no_programs}")
+    for program in analysis.programs:
+        last = program.last
+        names = {"real time": last.realtime, "faults ever": last.faults_ever}
+        counts = {
+            "ticks": last.ticks,
+            "skipped": last.skipped,
+            "on old input": last.stale_ticks,
+            "unsent": last.unsent,
+            "missed": last.missed,
+            "refused": last.refused,
+            "takeovers": last.takeovers,
+            "page faults": last.minor_faults + last.major_faults,
+            "allocations": "not counted" if last.allocations is None else last.allocations,
+        }
+        worst = ", ".join(
+            f"{key.removesuffix('_us')} {values.p50:.0f} / {values.p99:.0f} / {values.p999:.0f} / "
+            f"{values.max:.0f}"
+            for key, values in program.worst.items()
+        )
+        lines = (
+            f"{last.state}, {last.rate_hz:g} Hz, {_short(names)}",
+            _short(counts),
+            f"worst p50 / p99 / p99.9 / max of a second in us: {worst}",
+        )
+        for k, line in enumerate(lines):
+            name = program.name if k == 0 else ""
+            console.print(f"  {name:22} {line}", soft_wrap=True, markup=False)
 
 
 def _short(value: Any) -> str:

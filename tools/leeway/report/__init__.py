@@ -147,6 +147,11 @@ def _section(label: str, slug: str, a: Analysis, write: _Writer) -> Section:
         pictures["timing"] = write(
             "timing", f"{label}: histograms of wake lateness and execution", timing
         )
+    programs = figures.program_times(a)
+    if programs is not None:
+        pictures["programs"] = write(
+            "programs", f"{label}: lateness, execution and age of input over time", programs
+        )
     marked = {number for number, _ in figures.marked_events(a)}
     return Section(label, slug, a, marked, pictures, list(_flat(a.scene)), view_data(a))
 
@@ -255,6 +260,7 @@ def _render(sections: list[Section], comparison: dict[str, Picture]) -> str:
         lstrip_blocks=True,
     )
     environment.filters["number"] = _number
+    environment.filters["names"] = _names
     title = "Leeway: " + ", ".join(section.label for section in sections)
     views = {section.slug: section.view for section in sections}
     return environment.get_template("report.html.j2").render(
@@ -263,6 +269,10 @@ def _render(sections: list[Section], comparison: dict[str, Picture]) -> str:
         comparison=comparison,
         views=json.dumps(views, separators=(",", ":")),
     )
+
+
+def _names(names: list[str]) -> str:
+    return ", ".join(names).replace("_", " ") or "none"
 
 
 def _number(value: float, digits: int = 4, missing: str = "\N{EN DASH}") -> str:

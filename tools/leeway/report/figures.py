@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from leeway.logs.analysis import FLAGS, MOVING_POINTS, Analysis
 from leeway.logs.events import Event
@@ -40,6 +42,7 @@ INK, GREY, PALE = "#222222", "#6b6b6b", "#d9d9d9"
 COLUMNS = 1000  # of a time plot: more points than twice this are reduced
 WIDTH, HEIGHT = 9.0, 3.5  # inch
 EVENT_MARKS_MAX = 40
+PROGRAM_TIMES = {"wake_late_us": "wake-up late", "exec_us": "execution", "age_us": "age of input"}
 DRAWN_MAX = 1e6  # larger numbers come from damaged logs: gaps in the pictures
 
 
@@ -190,7 +193,7 @@ def timing(a: Analysis) -> Figure | None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylim(bottom=0.7)
-        _log_ticks(axes, float(edges[0]), float(edges[-1]))
+        _log_ticks(axes.xaxis, float(edges[0]), float(edges[-1]))
         stats = a.timing.get(key, {})
         for name, style in (("p50", ":"), ("p99", "--"), ("max", "-")):
             if name in stats:
@@ -204,6 +207,28 @@ def timing(a: Analysis) -> Figure | None:
         if stats:
             axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, fontsize=9)
         axes.set_title(title, loc="left", pad=26, fontsize=11, fontweight="bold")
+    return figure
+
+
+def program_times(a: Analysis) -> Figure | None:
+    """p99 of the last second over time, a panel a program; None without STATUS, and in lockstep."""
+    if not a.programs or a.mode == "lockstep":
+        return None
+    figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, len(a.programs), sharey=True, squeeze=False)[0]
+    for axes, program in zip(panels, a.programs, strict=True):
+        _dress(axes, f"Times of the {program.name}, p99 of a second", "")
+        axes.set_xlabel("time of motion [s]")
+        axes.set_yscale("log")
+        inside = (program.t >= a.t[0]) & (program.t <= a.t[-1])
+        for k, (key, label) in enumerate(PROGRAM_TIMES.items()):
+            _line(axes, program.t[inside], program.p99_us[key][inside], k, label)
+        _finish(figure, axes, a, columns=3)
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(low, 2 * high)  # room for the numbers of the events
+    panels[0].set_ylabel("µs (logarithmic)")
+    _log_ticks(panels[0].yaxis, low, high)
     return figure
 
 
@@ -338,10 +363,10 @@ def _lanes(axes: Axes, a: Analysis, active: list[str]) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _log_ticks(axes: Axes, low: float, high: float) -> None:
+def _log_ticks(axis: Axis, low: float, high: float) -> None:
     """Label a logarithmic axis with plain numbers: 1, 2, 5 of each decade, or 1 alone of many."""
     digits = (1, 2, 5) if high < 60 * low else (1,)
     decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     ticks = [m * 10**d for d in decades for m in digits if low <= m * 10**d <= high]
-    axes.set_xticks(ticks, [f"{v:g}" for v in ticks])
-    axes.minorticks_off()
+    axis.set_ticks(ticks, labels=[f"{v:g}" for v in ticks])
+    axis.set_minor_locator(NullLocator())
