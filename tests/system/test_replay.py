@@ -16,6 +16,7 @@ from helpers import Listener, leeway, read, running, wait_until
 from leeway_lcm import leeway as wire
 
 from leeway import bus
+from leeway.connection import Connection
 from leeway.processes import Child
 
 pytestmark = pytest.mark.usefixtures("private_network")
@@ -34,9 +35,9 @@ def ticks_in(log: Path) -> int:
 
 
 @contextlib.contextmanager
-def recorded(log: Path) -> Iterator[lcm.LCM]:
+def recorded(log: Path) -> Iterator[Connection]:
     """Record all that happens in the block, to the last message; a bus to speak on."""
-    own = lcm.LCM(bus.resolve_url(None))
+    own = bus.open_bus(bus.resolve_url(None))
     mark = f"end of {log.name}".encode()
     logger = Child("lcm-logger", "-q", "-f", str(log), ahead=True)
 
@@ -168,7 +169,7 @@ def test_a_post_mortem_log_is_equal_but_for_its_first_tick(root: Path, tmp_path:
     with running("leeway-controller", scene, f"--post-mortem={folder}"):
         with running("leeway-simulator", scene) as simulator:
             listener.wait_for("JOINT_COMMAND", lambda c: c.mode == c.VELOCITY)
-            own = lcm.LCM(bus.resolve_url(None))
+            own = bus.open_bus(bus.resolve_url(None))
             assert bus.send_obstacles(own, None, bus.UPSERT, [(9, (0.2, -0.9, 0.5), 0.1)])
             listener.wait_for("JOINT_COMMAND", lambda c: c.tick > 400)
             simulator.kill()
