@@ -98,16 +98,14 @@ static bool step(struct lockstep *l)
     return true;
 }
 
-// Asked to stop in mid-motion: ramps to rest by itself, as when commands cease.
+// Asked to stop in mid-motion: ramps to rest by itself, as when commands cease. The state now may not be known to
+// anybody yet, even when it is one of rest.
 static void come_to_rest(struct lockstep *l)
 {
     struct lw_simulation *s = l->simulation;
     lw_plant_stop(&s->arm);
-    while (!lw_plant_at_rest(&s->arm)) {
+    while (lw_simulation_publish_state(s, l->bus, &l->state) == LW_OK && !lw_plant_at_rest(&s->arm))
         lw_plant_step(&s->plant, &s->arm, s->arm.tick * s->plant.period_ns);
-        if (lw_simulation_publish_state(s, l->bus, &l->state) != LW_OK)
-            return;
-    }
 }
 
 int lw_simulation_lockstep(struct lw_simulation *simulation)
