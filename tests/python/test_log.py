@@ -178,7 +178,7 @@ def test_status_and_world_are_read_by_robot_and_may_be_missing(tmp_path: Path) -
     for prefix, name in (("", None), ("ARM1_", "ARM1"), ("PLANT_2_", "PLANT_2")):
         run = Run(ticks=13)
         run.tell()
-        run.before.append(("WORLD", obstacles(CONTROLLER, 1, 2, [(1, (1.0, 1.0, 0.4), 0.0)])))
+        run.before.append(("WORLD", obstacles(CONTROLLER, 1, 2, [(7, (1.0, 1.0, 0.4), 0.0)])))
         stranger = event("OTHER_STATUS", status(99, 0).encode())
         cut = event(prefix + "STATUS", status(CONTROLLER, 0).encode()[:-1])
         log = read_bytes(tmp_path, run.data(prefix) + stranger + cut, name)
@@ -186,7 +186,7 @@ def test_status_and_world_are_read_by_robot_and_may_be_missing(tmp_path: Path) -
         assert log.plant_statuses.session.tolist() == [PLANT] * 3
         assert (log.statuses.refused.shape, log.statuses.age_ns.shape) == ((3, 16), (3, 4))
         assert log.statuses.ticks.tolist() == [500, 506, 512]
-        assert log.worlds.id[:, 0].tolist() == [1]
+        assert log.worlds.id[:, 0].tolist() == [7]
         assert (log.counts[prefix + "WORLD"], log.undecodable) == (1, {prefix + "STATUS": 1})
     assert len(read_bytes(tmp_path, WHOLE.data()).statuses) == 0
 
