@@ -19,7 +19,9 @@
 #include <unistd.h>   // getpid
 
 enum { PATH_MAX_BYTES = 512, FOLDER_MODE = 0777 };
+enum { FILES_MAX = 20 };
 static const int64_t aftermath_ns = LW_NS_PER_S / 5;
+static const int64_t forget_ns = 10 * LW_NS_PER_S; // without any fault: the next one is news again
 
 // --- what was heard ---
 
@@ -172,6 +174,11 @@ static unsigned find_faults(struct lw_postmortem *postmortem, const struct lw_he
     for (int back = 0; record != NULL && record->time_ns > looked_ns; record = lw_health_past(health, ++back)) {
         if (back == 0)
             postmortem->looked_ns = record->time_ns;
+        // An idle controller has no arm to brake.
+        if (record->faults == 0 || record->command.mode == LW_COMMAND_IDLE)
+            continue;
+        if (record->time_ns > postmortem->faulty_ns)
+            postmortem->faulty_ns = record->time_ns;
         if ((record->faults & ~postmortem->seen) == 0)
             continue;
         faults |= record->faults & ~postmortem->seen;
@@ -184,6 +191,8 @@ void lw_postmortem_watch(struct lw_postmortem *postmortem, const struct lw_progr
                          const struct lw_health *health, struct lw_heard *heard, int64_t now_ns)
 {
     int64_t first_ns = 0;
+    if (postmortem->looked_ns - postmortem->faulty_ns > forget_ns)
+        postmortem->seen = 0;
     const unsigned faults = find_faults(postmortem, health, &first_ns);
     if (faults != 0 && postmortem->fault == 0)
         postmortem->due_ns = first_ns + aftermath_ns;
@@ -191,6 +200,7 @@ void lw_postmortem_watch(struct lw_postmortem *postmortem, const struct lw_progr
     postmortem->fault |= faults;
     if (postmortem->fault == 0 || now_ns < postmortem->due_ns)
         return;
-    write_file(postmortem, program, bus, health, heard);
+    if (postmortem->written++ < FILES_MAX)
+        write_file(postmortem, program, bus, health, heard);
     postmortem->fault = 0;
 }

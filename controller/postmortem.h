@@ -39,7 +39,9 @@ void lw_heard_init(struct lw_heard *heard);
 void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union lw_message *message);
 
 struct lw_postmortem {
-    unsigned seen;              // faults that braked the arm before
+    unsigned seen;              // faults that braked the arm of late
+    int64_t faulty_ns;          // when the newest of them was
+    int written;                // files
     unsigned fault;             // those to write about, 0 = none
     int64_t due_ns;             // when: a moment later, so that the file shows what followed
     int64_t looked_ns;          // time of the newest tick looked at
