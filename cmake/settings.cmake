@@ -22,6 +22,7 @@ target_compile_options(leeway_settings INTERFACE -ffp-contract=off
 find_package(Threads REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(yaml REQUIRED IMPORTED_TARGET yaml-0.1)
+pkg_check_modules(ccd REQUIRED IMPORTED_TARGET ccd)
 
 # leeway_library(NAME SOURCES...): static library lw_NAME.
 function(leeway_library name)

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Closed forms: segment against point, segment, half-space and box.
+//
+// Units    metres.
+// Frames   see closed.h; a box is handled in its own axes.
+// Arrays   see closed.h.
+// Memory   none.
+// Errors   none.
+#include "collision/closed.h"
+
+#include <math.h>    // sqrt, fabs, INFINITY, NAN
+#include <stdbool.h> // bool
+#include <string.h>  // memcpy
+
+void lw_closed_perpendicular(const double u[3], double out[3])
+{
+    // Across the axis that u follows least.
+    const double x = fabs(u[0]), y = fabs(u[1]), z = fabs(u[2]);
+    const int least = z <= x && z <= y ? 2 : y <= x ? 1 : 0;
+    double axis[3] = {0};
+    axis[least] = 1;
+    lw_vec_cross(u, axis, out);
+    const double length = lw_vec_norm(out);
+    for (int i = 0; i < 3; i++)
+        out[i] = length > 0 ? out[i] / length : (double)(i == 2);
+}
+
+// --- sphere ---
+
+void lw_closed_sphere(const struct lw_capsule *link, const double c[3], double r, struct lw_distance *out)
+{
+    double u[3], w[3], qa[3], v[3];
+    lw_vec_sub(link->b, link->a, u);
+    lw_vec_sub(c, link->a, w);
+    const double uu = lw_vec_dot(u, u);
+    const double t = uu > 0 ? lw_closed_clamp(lw_vec_dot(w, u) / uu, 0, 1) : 0;
+    for (int i = 0; i < 3; i++) {
+        qa[i] = link->a[i] + t * u[i];
+        v[i] = t * u[i] - w[i];
+    }
+    if (lw_vec_dot(v, v) <= lw_touch_square) {
+        lw_closed_perpendicular(u, v);
+        lw_closed_core(qa, v, 0, (double[2]){link->r, r}, out);
+        return;
+    }
+    lw_closed_apart(qa, v, link->r, r, out);
+}
+
+// --- capsule ---
+
+// Two segments p + s u and q + t w, s and t in 0..1, with r = p - q.
+struct segments {
+    double u[3], w[3], r[3];
+    double uu, ww, uw, ur, wr;
+    double s, t; // best so far
+    double v[3]; // r + s u - t w, from the second to the first
+    double vv;
+};
+
+static double over(double value, double square)
+{
+    return square > 0 ? value / square : 0;
+}
+
+// Keeps the pair s, t when it is nearer.
+static void try_pair(struct segments *g, double s, double t)
+{
+    double v[3];
+    for (int i = 0; i < 3; i++)
+        v[i] = g->r[i] + s * g->u[i] - t * g->w[i];
+    const double vv = lw_vec_dot(v, v);
+    if (vv >= g->vv)
+        return;
+    g->s = s;
+    g->t = t;
+    g->vv = vv;
+    memcpy(g->v, v, sizeof v);
+}
+
+// The best t for an s, and where that leaves the segment, the best s for the clamped t.
+static void try_s(struct segments *g, double s)
+{
+    const double free_t = over(g->uw * s + g->wr, g->ww), t = lw_closed_clamp(free_t, 0, 1);
+    if (t != free_t)
+        s = lw_closed_clamp(over(g->uw * t - g->ur, g->uu), 0, 1);
+    try_pair(g, s, t);
+}
+
+static void find_nearest(struct segments *g)
+{
+    const double product = g->uu * g->ww, det = product - g->uw * g->uw;
+    const double interior = lw_closed_clamp(over(g->uw * g->wr - g->ur * g->ww, det), 0, 1);
+    if (det > 1e-6 * product) {
+        try_s(g, interior);
+        return;
+    }
+    // Nearly parallel, or of no length: the ends, each with the nearest point of the other, and one pair within.
+    try_pair(g, 0, lw_closed_clamp(over(g->wr, g->ww), 0, 1));
+    try_pair(g, 1, lw_closed_clamp(over(g->uw + g->wr, g->ww), 0, 1));
+    try_pair(g, lw_closed_clamp(over(-g->ur, g->uu), 0, 1), 0);
+    try_pair(g, lw_closed_clamp(over(g->uw - g->ur, g->uu), 0, 1), 1);
+    if (det > 1e-14 * product)
+        try_s(g, interior);
+}
+
+// Direction out of two segments that meet: perpendicular to both, or to the longer one where they are parallel.
+static void crossing_normal(const struct segments *g, double n[3])
+{
+    lw_vec_cross(g->u, g->w, n);
+    const double square = lw_vec_dot(n, n);
+    if (!(square > 1e-20 * g->uu * g->ww)) {
+        lw_closed_perpendicular(g->uu >= g->ww ? g->u : g->w, n);
+        return;
+    }
+    for (int i = 0; i < 3; i++)
+        n[i] /= sqrt(square);
+}
+
+void lw_closed_capsule(const struct lw_capsule *link, const struct lw_capsule *other, struct lw_distance *out)
+{
+    struct segments g = {.vv = INFINITY, .v = {NAN, NAN, NAN}};
+    double qa[3], n[3];
+    lw_vec_sub(link->b, link->a, g.u);
+    lw_vec_sub(other->b, other->a, g.w);
+    lw_vec_sub(link->a, other->a, g.r);
+    g.uu = lw_vec_dot(g.u, g.u);
+    g.ww = lw_vec_dot(g.w, g.w);
+    g.uw = lw_vec_dot(g.u, g.w);
+    g.ur = lw_vec_dot(g.u, g.r);
+    g.wr = lw_vec_dot(g.w, g.r);
+    find_nearest(&g);
+    for (int i = 0; i < 3; i++)
+        qa[i] = link->a[i] + g.s * g.u[i];
+    if (g.vv <= lw_touch_square) {
+        crossing_normal(&g, n);
+        lw_closed_core(qa, n, 0, (double[2]){link->r, other->r}, out);
+        return;
+    }
+    lw_closed_apart(qa, g.v, link->r, other->r, out);
+}
+
+// --- half-space ---
+
+void lw_closed_halfspace(const struct lw_capsule *link, const struct lw_shape *shape, struct lw_distance *out)
+{
+    const double a = lw_vec_dot(shape->halfspace.m, link->a), b = lw_vec_dot(shape->halfspace.m, link->b);
+    // Ends of one height: the middle, so that the point does not jump from end to end.
+    const double t = fabs(a - b) <= 1e-15 * (fabs(a) + fabs(b)) ? 0.5 : a < b ? 0 : 1;
+    const double height = (a < b ? a : b) - shape->halfspace.o + 0 * (a + b); // what is not finite must show
+    double qa[3];
+    lw_closed_along(link->a, link->b, t, qa);
+    out->d = height - link->r;
+    for (int i = 0; i < 3; i++) {
+        out->n[i] = shape->halfspace.m[i];
+        out->pa[i] = qa[i] - link->r * shape->halfspace.m[i];
+        out->pb[i] = out->pa[i] - out->d * shape->halfspace.m[i];
+    }
+    out->flags = height < 0 ? LW_DISTANCE_CORE : 0;
+    out->iterations = 0;
+}
+
+// --- box ---
+
+// A segment x0 + t u beside a box of half extents h at the origin.
+struct beside {
+    double x0[3], x1[3], u[3];
+    const double *h;
+};
+
+// Half the slope of the squared distance along the segment, sum of u_i times what x_i is outside by: monotone in t and
+// linear between the kinks where the segment passes a face's plane.
+//   steepness  out  its own slope
+//   sides      out  which planes x is beyond: equal sides, same linear piece
+static double slope_at(const struct beside *g, double t, double *steepness, int *sides)
+{
+    double slope = 0;
+    *steepness = 0;
+    *sides = 0;
+    for (int i = 0; i < 3; i++) {
+        const double x = g->x0[i] + t * g->u[i];
+        const int above = x > g->h[i], below = x < -g->h[i];
+        const double active = above + below;
+        slope += active * g->u[i] * (x - (above - below) * g->h[i]);
+        *steepness += active * g->u[i] * g->u[i];
+        *sides |= (above + 2 * below) << (2 * i);
+    }
+    return slope;
+}
+
+// Stretch of t in 0..1 where no plane of an axis that the segment moves along is passed: there the squared distance
+// does not change. Empty when first > last.
+static void level_stretch(const struct beside *g, double *first, double *last)
+{
+    double size = 0;
+    for (int i = 0; i < 3; i++)
+        size += fabs(g->x0[i]) + fabs(g->x1[i]);
+    *first = 0;
+    *last = 1;
+    for (int i = 0; i < 3; i++) {
+        if (!(fabs(g->u[i]) > 1e-15 * size))
+            continue;
+        const double one = (-g->h[i] - g->x0[i]) / g->u[i], other = (g->h[i] - g->x0[i]) / g->u[i];
+        const double enter = one < other ? one : other, leave = one < other ? other : one;
+        *first = enter > *first ? enter : *first;
+        *last = leave < *last ? leave : *last;
+    }
+}
+
+// The t of slope 0, which lies between two kinks, where the slope is linear.
+static double between_kinks(const struct beside *g, double slope0, double slope1)
+{
+    double low = 0, slope_low = slope0, high = 1, slope_high = slope1;
+    for (int k = 0; k < 6; k++) {
+        const int i = k / 2;
+        const double t = g->u[i] != 0 ? ((k % 2 ? g->h[i] : -g->h[i]) - g->x0[i]) / g->u[i] : -1;
+        double steepness;
+        int sides;
+        if (!(t > low && t < high))
+            continue;
+        const double slope = slope_at(g, t, &steepness, &sides);
+        *(slope < 0 ? &low : &high) = t;
+        *(slope < 0 ? &slope_low : &slope_high) = slope;
+    }
+    const double rise = slope_high - slope_low;
+    return rise > 0 ? low - (high - low) * slope_low / rise : low;
+}
+
+// The t of the segment's point nearest to the box, the middle of them where there are many.
+static double nearest_t(const struct beside *g, uint16_t *iterations)
+{
+    double first, last, steepness, low = 0, high = 1;
+    int sides, sides_before = -1;
+    *iterations = 0;
+    level_stretch(g, &first, &last);
+    if (first <= last)
+        return 0.5 * (first + last);
+    const double slope0 = slope_at(g, 0, &steepness, &sides), slope1 = slope_at(g, 1, &steepness, &sides);
+    if (!(slope0 < 0))
+        return 0;
+    if (!(slope1 > 0))
+        return 1;
+    // Newton between brackets: on one linear piece its step is exact.
+    double t = slope0 / (slope0 - slope1);
+    for (int step = 0; step < 6; step++) {
+        const double slope = slope_at(g, t, &steepness, &sides);
+        ++*iterations;
+        if (!(steepness > 0))
+            break;
+        const double next = t - slope / steepness;
+        if (sides == sides_before)
+            return lw_closed_clamp(next, low, high);
+        *(slope > 0 ? &high : &low) = t;
+        const bool inside = next > low && next < high;
+        sides_before = inside ? sides : -1;
+        t = inside ? next : low + 0.5 * (high - low);
+    }
+    return between_kinks(g, slope0, slope1);
+}
+
+// From the box to the segment's point at t.
+static void outside_at(const struct beside *g, double t, double v[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const double x = g->x0[i] + t * g->u[i];
+        v[i] = x - lw_closed_clamp(x, -g->h[i], g->h[i]);
+    }
+}
+
+// A vector in box axes, in the frame of the box's axes.
+static void turn_out(const struct lw_shape *box, const double v[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = lw_vec_dot(&box->box.axes[3 * i], v);
+}
+
+// Overlap: depth and direction by separating axes; the witness is nearest once the segment has moved out.
+static void box_core(const struct lw_capsule *link, const struct lw_shape *box, struct beside *g,
+                     struct lw_distance *out)
+{
+    double inward[3], n[3], qa[3];
+    uint16_t iterations;
+    const double depth = lw_sat_box(g->x0, g->x1, g->h, inward);
+    lw_vec_add_scaled(depth, inward, g->x0);
+    lw_vec_add_scaled(depth, inward, g->x1);
+    lw_closed_along(link->a, link->b, nearest_t(g, &iterations), qa);
+    turn_out(box, inward, n);
+    lw_closed_core(qa, n, depth, (double[2]){link->r, box->r}, out);
+}
+
+void lw_closed_box(const struct lw_capsule *link, const struct lw_shape *box, struct lw_distance *out)
+{
+    struct beside g = {.h = box->box.half};
+    double a[3], b[3], inside[3], v[3], qa[3];
+    uint16_t iterations;
+    lw_vec_sub(link->a, box->c, a);
+    lw_vec_sub(link->b, box->c, b);
+    for (int i = 0; i < 3; i++) {
+        const double *r = &box->box.axes[i];
+        g.x0[i] = r[0] * a[0] + r[3] * a[1] + r[6] * a[2];
+        g.x1[i] = r[0] * b[0] + r[3] * b[1] + r[6] * b[2];
+        g.u[i] = g.x1[i] - g.x0[i];
+    }
+    const double t = nearest_t(&g, &iterations);
+    outside_at(&g, t, inside);
+    if (lw_vec_dot(inside, inside) <= lw_touch_square) {
+        box_core(link, box, &g, out);
+    } else {
+        turn_out(box, inside, v);
+        lw_closed_along(link->a, link->b, t, qa);
+        lw_closed_apart(qa, v, link->r, box->r, out);
+    }
+    out->iterations = iterations;
+}
