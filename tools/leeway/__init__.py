@@ -1,6 +1,6 @@
 """Leeway: gives a robot arm room.
 
-Kinematics, scenes and in-process runs come from the same C code that the controller runs.
+Kinematics, distances, scenes and in-process runs come from the same C code that the controller runs.
 Units are SI, angles radians; positions are in the base frame of the arm (its DH base).
 
 >>> import leeway
@@ -17,8 +17,25 @@ if TYPE_CHECKING:
     from leeway.arm import Arm
     from leeway.logs.log import read_log
     from leeway.scene import Run, Scene, load_scene, simulate
+    from leeway.shapes import Box, Capsule, Distance, HalfSpace, Hull, Shape, Sphere, distance
 
-__all__ = ["BUILD", "Arm", "Run", "Scene", "load_scene", "read_log", "simulate"]
+__all__ = [
+    "BUILD",
+    "Arm",
+    "Box",
+    "Capsule",
+    "Distance",
+    "HalfSpace",
+    "Hull",
+    "Run",
+    "Scene",
+    "Shape",
+    "Sphere",
+    "distance",
+    "load_scene",
+    "read_log",
+    "simulate",
+]
 
 # Modules are loaded when a name of theirs is first used: `leeway stop` need not wait for NumPy.
 _HOMES = {
@@ -26,6 +43,10 @@ _HOMES = {
     "leeway.arm": ("Arm",),
     "leeway.logs.log": ("read_log",),
     "leeway.scene": ("Run", "Scene", "load_scene", "simulate"),
+    "leeway.shapes": (
+        *("Box", "Capsule", "Distance", "HalfSpace", "Hull", "Shape", "Sphere"),
+        "distance",
+    ),
 }
 
 

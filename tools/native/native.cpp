@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Python module leeway._native: the arms, scenes and in-process runs of the C code, as NumPy arrays.
+// Python module leeway._native: the arms, shapes, scenes and in-process runs of the C code, as NumPy arrays.
 //
 // Units    metres, radians, seconds.
 // Frames   base frame of the arm.
 // Arrays   float64, C order, batches over all leading axes.
 // Memory   results are owned by Python.
 // Errors   ValueError with the C code's text.
-#include "replay.hpp" // bind_replay
-#include "scene.hpp"  // Scene
+#include "arrays.hpp"    // Input, Output, Owned
+#include "collision.hpp" // bind_collision
+#include "replay.hpp"    // bind_replay
+#include "scene.hpp"     // Scene
 
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>      // NAN
 #include <functional> // multiplies
-#include <memory>     // unique_ptr
 #include <numeric>    // accumulate
 #include <stdexcept>  // invalid_argument
 #include <string>
@@ -30,28 +30,6 @@ namespace nb = nanobind;
 
 namespace
 {
-
-using Input = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
-template <typename T> using Output = nb::ndarray<nb::numpy, T, nb::c_contig>;
-
-// A new array that owns its memory.
-template <typename T> struct Owned {
-    std::vector<size_t> shape;
-    std::unique_ptr<T[]> data;
-
-    explicit Owned(std::vector<size_t> dimensions)
-        : shape(std::move(dimensions)),
-          data(new T[std::accumulate(shape.begin(), shape.end(), size_t{1}, std::multiplies<>())]())
-    {
-    }
-
-    Output<T> release()
-    {
-        T *values = data.release();
-        nb::capsule owner(values, [](void *p) noexcept { delete[] static_cast<T *>(p); });
-        return Output<T>(values, shape.size(), shape.data(), owner);
-    }
-};
 
 struct Arm {
     const lw_arm *model;
@@ -159,7 +137,7 @@ nb::dict simulate(const Scene &scene)
 
 NB_MODULE(_native, m)
 {
-    m.doc() = "C code of Leeway: arms, scenes, in-process runs.";
+    m.doc() = "C code of Leeway: arms, shapes, scenes, in-process runs.";
     m.attr("BUILD") = LW_BUILD;
 
     nb::class_<Arm>(m, "Arm", "Kinematics of a robot. Frames: base frame of the arm. Source: DH table of the maker.")
@@ -178,6 +156,7 @@ NB_MODULE(_native, m)
     m.def("read_scene", &Scene::read, nb::arg("text"), nb::arg("name"), nb::arg("sets"),
           "Reads a scene from YAML text; sets is a list of \"key=value\".");
     m.def("describe_scene", &describe_scene, "Reference of all keys of a scene, for people.");
+    bind_collision(m);
     m.def("simulate", &simulate, nb::arg("scene"), "Runs a scene in process; arrays by name.");
     bind_replay(m);
 }
