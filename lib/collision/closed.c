@@ -226,7 +226,7 @@ static double between_kinks(const struct beside *g, double slope0, double slope1
 }
 
 // The t of the segment's point nearest to the box, the middle of them where there are many.
-static double nearest_t(const struct beside *g, uint16_t *iterations)
+static double nearest_t(const struct beside *g, int *iterations)
 {
     double first, last, steepness, low = 0, high = 1;
     int sides, sides_before = -1;
@@ -278,7 +278,7 @@ static void box_core(const struct lw_capsule *link, const struct lw_shape *box, 
                      struct lw_distance *out)
 {
     double inward[3], n[3], qa[3];
-    uint16_t iterations;
+    int iterations;
     const double depth = lw_sat_box(g->x0, g->x1, g->h, inward);
     lw_vec_add_scaled(depth, inward, g->x0);
     lw_vec_add_scaled(depth, inward, g->x1);
@@ -291,7 +291,7 @@ void lw_closed_box(const struct lw_capsule *link, const struct lw_shape *box, st
 {
     struct beside g = {.h = box->box.half};
     double a[3], b[3], inside[3], v[3], qa[3];
-    uint16_t iterations;
+    int iterations;
     lw_vec_sub(link->a, box->c, a);
     lw_vec_sub(link->b, box->c, b);
     for (int i = 0; i < 3; i++) {

@@ -95,7 +95,7 @@ static void overlap(const struct lw_gjk_query *query, const double r[2], int epa
     lw_vec_add_scaled(1, back, qa);
     lw_closed_core(qa, n, epa.depth, r, out);
     out->flags |= epa.flags;
-    out->iterations = (uint16_t)epa.iterations;
+    out->iterations = epa.iterations;
 }
 
 void lw_clouds_distance(const struct lw_gjk_query *query, struct lw_simplex *simplex, const double r[2], int epa_cap,
@@ -113,7 +113,7 @@ void lw_clouds_distance(const struct lw_gjk_query *query, struct lw_simplex *sim
         lw_closed_apart(qa, simplex->v, r[0], r[1], out);
         out->flags = gjk.flags;
     }
-    out->iterations = (uint16_t)(out->iterations + gjk.iterations);
+    out->iterations += gjk.iterations;
 }
 
 void lw_clouds_shift(const double by[3], struct lw_distance *out)

@@ -100,7 +100,7 @@ static bool add_support(struct search *g, const double direction[3])
 }
 
 // Searches from a direction on. Returns flags as lw_gjk does; the bound goes with FAR.
-static uint16_t nearest(struct search *g, const double start[3], double far, uint16_t *iterations, double *bound)
+static int nearest(struct search *g, const double start[3], double far, int *iterations, double *bound)
 {
     struct lw_simplex *s = &g->simplex;
     s->count = 0;
@@ -144,13 +144,13 @@ void lw_custom_distance(const struct lw_shape *a, const struct lw_shape *b, doub
     struct side side_a, side_b;
     struct search g = {.a = &side_a, .b = &side_b};
     double start[3], bound = 0, qa[3] = {0};
-    uint16_t iterations = 1;
+    int iterations = 1;
     set_side(a, b->c, &side_a);
     set_side(b, b->c, &side_b);
     lw_vec_sub(a->c, b->c, start);
     if (!(lw_vec_dot(start, start) > 0))
         start[2] = 1;
-    uint16_t flags = nearest(&g, start, d_max + a->r + b->r, &iterations, &bound);
+    int flags = nearest(&g, start, d_max + a->r + b->r, &iterations, &bound);
     const bool open = flags & (LW_DISTANCE_CAPPED | LW_DISTANCE_STALLED);
     if (open && isfinite(g.simplex.square) && cores_meet(&side_a, &side_b))
         flags = LW_DISTANCE_CORE;

@@ -13,7 +13,7 @@
 #include "base/status.h"     // enum lw_status
 #include "collision/shape.h" // struct lw_shape, struct lw_capsule
 
-#include <stdint.h> // uint8_t
+#include <stdint.h> // uint8_t, uint32_t
 
 enum lw_distance_flag {
     LW_DISTANCE_CORE = 1,      // the cores meet: stop, do not follow n, which may jump from face to face
@@ -29,8 +29,8 @@ struct lw_distance {
     double pa[3]; // m, on the link's surface
     double pb[3]; // m, on the shape's surface
     double n[3];  // unit, from the shape to the link: the gradient of d when the link moves
-    uint16_t iterations;
-    uint16_t flags; // enum lw_distance_flag
+    int iterations;
+    int flags; // enum lw_distance_flag
 };
 
 // Where the last query of a pair ended: the next one starts there. All zero = nowhere. It is used only while id and

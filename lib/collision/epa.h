@@ -12,15 +12,13 @@
 
 #include "collision/gjk.h" // struct lw_gjk_query
 
-#include <stdint.h> // uint16_t
-
 enum { LW_EPA_CAP = 92 };
 
 struct lw_epa_result {
     double depth;   // m, moving a by depth against `out` parts the hulls
     double out[3];  // unit
     int iterations; // supports after the first ones
-    uint16_t flags; // of enum lw_distance_flag: 0 or STALLED
+    int flags;      // of enum lw_distance_flag: 0 or STALLED
 };
 
 // Least motion that parts two clouds whose hulls overlap or touch.

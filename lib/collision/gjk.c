@@ -57,7 +57,7 @@ static bool start(const struct lw_gjk_query *query, struct lw_simplex *s, struct
         s->count = 1;
         out->iterations = 1;
     }
-    return lw_simplex_reduce(s, INFINITY);
+    return query->size < (double)INFINITY && lw_simplex_reduce(s, INFINITY);
 }
 
 void lw_gjk(const struct lw_gjk_query *query, struct lw_simplex *s, struct lw_gjk_result *out)

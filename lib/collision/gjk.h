@@ -12,8 +12,6 @@
 #include "collision/simplex.h" // struct lw_simplex
 #include "collision/support.h" // struct lw_cloud
 
-#include <stdint.h> // uint16_t
-
 enum { LW_GJK_CAP = 48 };
 
 struct lw_gjk_query {
@@ -26,7 +24,7 @@ struct lw_gjk_query {
 struct lw_gjk_result {
     double bound;   // m, with FAR alone: proven lower bound of the distance
     int iterations; // supports
-    uint16_t flags; // of enum lw_distance_flag: CORE, FAR, CAPPED, STALLED
+    int flags;      // of enum lw_distance_flag: CORE, FAR, CAPPED, STALLED
 };
 
 // Sets the points of a simplex from those of the clouds it names.

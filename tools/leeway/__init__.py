@@ -1,7 +1,7 @@
 """Leeway: gives a robot arm room.
 
-Kinematics, distances, scenes and in-process runs come from the same C code that the controller runs.
-Units are SI, angles radians; positions are in the base frame of the arm (its DH base).
+Kinematics, distances, scenes and in-process runs come from the same C code that the controller
+runs. Units are SI, angles radians; positions are in the base frame of the arm (its DH base).
 
 >>> import leeway
 >>> arm = leeway.Arm("ur5")

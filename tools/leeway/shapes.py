@@ -75,7 +75,7 @@ class Distance(NamedTuple):
     """
 
     distance: Array
-    """(...), m: between the surfaces, negative when they overlap (how far they have to move apart)."""
+    """(...), m: between the surfaces; negative: how far they have to move apart."""
     point_a: Array
     """(..., 3), m: nearest, or deepest, point on a."""
     point_b: Array
