@@ -14,15 +14,11 @@
 
 void lw_closed_perpendicular(const double u[3], double out[3])
 {
-    // Across the axis that u follows least.
-    const double x = fabs(u[0]), y = fabs(u[1]), z = fabs(u[2]);
-    const int least = z <= x && z <= y ? 2 : y <= x ? 1 : 0;
-    double axis[3] = {0};
-    axis[least] = 1;
-    lw_vec_cross(u, axis, out);
-    const double length = lw_vec_norm(out);
-    for (int i = 0; i < 3; i++)
-        out[i] = length > 0 ? out[i] / length : (double)(i == 2);
+    // u x (1, 0, 0), which is exact, or z when u is along x or zero.
+    const double length = sqrt(u[1] * u[1] + u[2] * u[2]);
+    out[0] = 0;
+    out[1] = length > 0 ? u[2] / length : 0;
+    out[2] = length > 0 ? -u[1] / length : 1;
 }
 
 // --- sphere ---
@@ -86,12 +82,21 @@ static void try_s(struct segments *g, double s)
     try_pair(g, s, t);
 }
 
+// The s nearest to the other line, by cross products: their error grows with 1 / angle, that of the products in
+// find_nearest with 1 / angle^2.
+static void try_crossing(struct segments *g)
+{
+    double n[3], wr[3];
+    lw_vec_cross(g->u, g->w, n);
+    lw_vec_cross(g->w, g->r, wr);
+    try_s(g, lw_closed_clamp(over(lw_vec_dot(wr, n), lw_vec_dot(n, n)), 0, 1));
+}
+
 static void find_nearest(struct segments *g)
 {
     const double product = g->uu * g->ww, det = product - g->uw * g->uw;
-    const double interior = lw_closed_clamp(over(g->uw * g->wr - g->ur * g->ww, det), 0, 1);
     if (det > 1e-6 * product) {
-        try_s(g, interior);
+        try_s(g, lw_closed_clamp((g->uw * g->wr - g->ur * g->ww) / det, 0, 1));
         return;
     }
     // Nearly parallel, or of no length: the ends, each with the nearest point of the other, and one pair within.
@@ -99,8 +104,7 @@ static void find_nearest(struct segments *g)
     try_pair(g, 1, lw_closed_clamp(over(g->uw + g->wr, g->ww), 0, 1));
     try_pair(g, lw_closed_clamp(over(-g->ur, g->uu), 0, 1), 0);
     try_pair(g, lw_closed_clamp(over(g->uw - g->ur, g->uu), 0, 1), 1);
-    if (det > 1e-14 * product)
-        try_s(g, interior);
+    try_crossing(g);
 }
 
 // Direction out of two segments that meet: perpendicular to both, or to the longer one where they are parallel.
@@ -228,7 +232,7 @@ static double between_kinks(const struct beside *g, double slope0, double slope1
 // The t of the segment's point nearest to the box, the middle of them where there are many.
 static double nearest_t(const struct beside *g, int *iterations)
 {
-    double first, last, steepness, low = 0, high = 1;
+    double first, last, steepness;
     int sides, sides_before = -1;
     *iterations = 0;
     level_stretch(g, &first, &last);
@@ -239,20 +243,14 @@ static double nearest_t(const struct beside *g, int *iterations)
         return 0;
     if (!(slope1 > 0))
         return 1;
-    // Newton between brackets: on one linear piece its step is exact.
+    // Newton: on one linear piece its step is exact, so it ends where it stays on the piece it came from.
     double t = slope0 / (slope0 - slope1);
-    for (int step = 0; step < 6; step++) {
+    while (++*iterations < 6 && t > 0 && t < 1) {
         const double slope = slope_at(g, t, &steepness, &sides);
-        ++*iterations;
-        if (!(steepness > 0))
-            break;
-        const double next = t - slope / steepness;
         if (sides == sides_before)
-            return lw_closed_clamp(next, low, high);
-        *(slope > 0 ? &high : &low) = t;
-        const bool inside = next > low && next < high;
-        sides_before = inside ? sides : -1;
-        t = inside ? next : low + 0.5 * (high - low);
+            return t;
+        sides_before = sides;
+        t -= steepness > 0 ? slope / steepness : 2;
     }
     return between_kinks(g, slope0, slope1);
 }

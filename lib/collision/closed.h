@@ -59,7 +59,7 @@ static inline void lw_closed_core(const double qa[3], const double n[3], double 
     out->iterations = 0;
 }
 
-// Unit vector perpendicular to u, the x axis for a zero u.
+// Unit vector perpendicular to u, z for a zero u.
 void lw_closed_perpendicular(const double u[3], double out[3]);
 
 void lw_closed_sphere(const struct lw_capsule *link, const double c[3], double r, struct lw_distance *out);

@@ -92,13 +92,13 @@ static double farthest_pair(double w[FIRST][3], double pair[2][3])
     return sqrt(longest);
 }
 
-// The point farthest from the line of the first two. Returns its distance; n is perpendicular to all three.
-static double farthest_from_line(double w[FIRST][3], double corner[3][3], double n[3])
+// The point farthest from the line of the first two corners. Returns its distance; n is perpendicular to all three.
+static double farthest_from_line(double (*w)[3], int count, double corner[3][3], double n[3])
 {
     double u[3], farthest = -1;
     lw_vec_sub(corner[1], corner[0], u);
     (void)scale_to_unit(u); // not zero: the pair is apart
-    for (int i = 0; i < FIRST; i++) {
+    for (int i = 0; i < count; i++) {
         double from[3], across[3];
         lw_vec_sub(w[i], corner[0], from);
         lw_vec_cross(u, from, across);
@@ -109,6 +109,23 @@ static double farthest_from_line(double w[FIRST][3], double corner[3][3], double
         memcpy(n, across, sizeof across);
     }
     return sqrt(farthest);
+}
+
+// Supports across the line of the first two corners, both ways of two directions: they miss nothing beside it, as the
+// first ones may.
+static void points_across(struct polytope *t, double w[4][3])
+{
+    double u[3], across[2][3], back[3];
+    lw_vec_sub(t->w[1], t->w[0], u);
+    (void)scale_to_unit(u); // not zero: the pair is apart
+    lw_closed_perpendicular(u, across[0]);
+    lw_vec_cross(u, across[0], across[1]);
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < 3; i++)
+            back[i] = -across[k][i];
+        (void)support(t, across[k], w[2 * k]);
+        (void)support(t, back, w[2 * k + 1]);
+    }
 }
 
 static void set_face(struct polytope *t, struct face *f, int i, int j, int k)
@@ -135,11 +152,10 @@ static bool find_tetrahedron(struct polytope *t)
     first_points(t, w);
     if (farthest_pair(w, t->w) < flat_part * t->scale)
         return false;
-    if (farthest_from_line(w, t->w, n) < flat_part * t->scale) {
-        lw_vec_sub(t->w[1], t->w[0], back);
-        lw_closed_perpendicular(back, n);
-        (void)support(t, n, low); // for the depth alone
-        return false;
+    if (farthest_from_line(w, FIRST, t->w, n) < flat_part * t->scale) {
+        points_across(t, w);
+        if (farthest_from_line(w, 4, t->w, n) < flat_part * t->scale)
+            return false;
     }
     (void)scale_to_unit(n); // not zero: the third point is off the line
     for (int i = 0; i < 3; i++)

@@ -123,12 +123,14 @@ static inline long double oracle_apart(const struct wide *v, int n, const struct
 
 // --- overlapping ---
 
-// The least motion along a normal or against it that parts two sets of points; smaller of *depth and that.
-static inline void oracle_part(const struct wide *v, int n, const struct wide *w, int m, struct wide normal,
+// The least motion along the normal of two edges or against it that parts two sets of points; smaller of *depth and
+// that. Edges that are parallel but for rounding have no normal.
+static inline void oracle_part(const struct wide *v, int n, const struct wide *w, int m, const struct wide edge[2],
                                long double *depth)
 {
-    const long double length = sqrtl(wide_dot(normal, normal));
-    if (!(length > 0))
+    const struct wide normal = wide_cross(edge[0], edge[1]);
+    const long double square = wide_dot(normal, normal), length = sqrtl(square);
+    if (!(square > 1e-24L * wide_dot(edge[0], edge[0]) * wide_dot(edge[1], edge[1])))
         return;
     long double low[2] = {(long double)INFINITY, (long double)INFINITY}, high[2] = {-low[0], -low[0]};
     for (int i = 0; i < n + m; i++) {
@@ -149,28 +151,47 @@ static inline long double oracle_depth(const struct wide *v, int n, const struct
         const struct wide *x = side ? w : v;
         for (int i = 0; i < (side ? m : n); i++)
             for (int j = 0; j < i; j++)
-                for (int k = 0; k < j; k++)
-                    oracle_part(v, n, w, m, wide_cross(wide_sub(x[j], x[i]), wide_sub(x[k], x[i])), &depth);
+                for (int k = 0; k < j; k++) {
+                    const struct wide edges[2] = {wide_sub(x[j], x[i]), wide_sub(x[k], x[i])};
+                    oracle_part(v, n, w, m, edges, &depth);
+                }
     }
     for (int i = 0; i < n; i++)
         for (int j = 0; j < i; j++)
             for (int k = 0; k < m; k++)
-                for (int l = 0; l < k; l++)
-                    oracle_part(v, n, w, m, wide_cross(wide_sub(v[j], v[i]), wide_sub(w[l], w[k])), &depth);
+                for (int l = 0; l < k; l++) {
+                    const struct wide edges[2] = {wide_sub(v[j], v[i]), wide_sub(w[l], w[k])};
+                    oracle_part(v, n, w, m, edges, &depth);
+                }
     return depth;
+}
+
+// Points relative to one of them: nothing is lost far from the origin.
+static inline void oracle_points(const double *points, int n, const double origin[3], struct wide v[64])
+{
+    for (int i = 0; i < n; i++)
+        v[i] = wide_sub(wide_of(&points[3 * i]), wide_of(origin));
+}
+
+// Distance of the hulls of n and of m points that are apart, at most 64 each.
+static inline long double oracle_apart_points(const double *a, int n, const double *b, int m)
+{
+    struct wide v[64], w[64];
+    oracle_points(a, n, b, v);
+    oracle_points(b, m, b, w);
+    return oracle_apart(v, n, w, m);
 }
 
 // Signed distance of the hulls of n and of m points, at most 64 each.
 static inline long double oracle_distance(const double *a, int n, const double *b, int m)
 {
-    // Relative to a point of one hull: nothing is lost far from the origin.
     struct wide v[64], w[64];
-    for (int i = 0; i < n; i++)
-        v[i] = wide_sub(wide_of(&a[3 * i]), wide_of(b));
-    for (int i = 0; i < m; i++)
-        w[i] = wide_sub(wide_of(&b[3 * i]), wide_of(b));
-    const long double depth = oracle_depth(v, n, w, m);
-    return depth > 0 && depth < (long double)INFINITY ? -depth : oracle_apart(v, n, w, m);
+    oracle_points(a, n, b, v);
+    oracle_points(b, m, b, w);
+    // Two hulls in one plane have a depth of rounding beside each other too: one inside the other is no farther from
+    // its surface than it is deep.
+    const long double depth = oracle_depth(v, n, w, m), apart = oracle_apart(v, n, w, m);
+    return depth > 0 && depth < (long double)INFINITY && apart <= depth + 1e-15L ? -depth : apart;
 }
 
 #endif

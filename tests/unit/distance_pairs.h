@@ -94,16 +94,26 @@ static inline int pair_hull_count(struct random *random)
     return 4 + random_below(random, random_below(random, 4) ? 5 : 13);
 }
 
+// Makes later vertices copies of earlier ones, exact or nearly so.
+static inline void pair_repeat(struct random *random, double noise, double v[LW_HULL_MAX][3], int n)
+{
+    for (int i = n / 2; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            v[i][k] = v[i - n / 2][k] + random_in(random, -noise, noise);
+}
+
 // Vertices of a hull about the origin, as its class wants them.
 static inline int pair_vertices(struct random *random, enum pair_class class, double v[LW_HULL_MAX][3])
 {
-    int n = class == FEW ? 1 + random_below(random, 5) : pair_hull_count(random);
-    const double plate[3] = {0.3, 0.3, 1e-7}, needle[3] = {1, 1e-4, 1e-4}, even[3] = {0.3, 0.3, 0.3};
-    const double *half = class == PLATE ? plate : class == NEEDLE ? needle : even;
+    const int n = class == FEW ? 1 + random_below(random, 5) : pair_hull_count(random);
     const double scale = class == TINY ? 1e-3 : class == LARGE ? 30 : 1;
+    const double half[3] = {scale * (class == NEEDLE ? 1 : 0.3), scale * (class == NEEDLE ? 1e-4 : 0.3),
+                            scale * (class == NEEDLE  ? 1e-4
+                                     : class == PLATE ? 1e-7
+                                                      : 0.3)};
     for (int i = 0; i < n; i++)
         for (int k = 0; k < 3; k++)
-            v[i][k] = scale * half[k] * random_in(random, -1, 1);
+            v[i][k] = half[k] * random_in(random, -1, 1);
     const double height = random_in(random, -0.2, 0.2);
     for (int i = 0; class == FLAT && i < n; i++)
         v[i][2] = height;
@@ -111,9 +121,8 @@ static inline int pair_vertices(struct random *random, enum pair_class class, do
     for (int i = 2; class == FEW && n > 3 && i < n; i++)
         for (int k = 0; k < 3; k++)
             v[i][k] = v[0][k] + 0.25 * i * (v[1][k] - v[0][k]);
-    for (int i = n / 2; (class == DUPLICATE || class == NEAR_DUPLICATE) && i < n; i++)
-        for (int k = 0; k < 3; k++)
-            v[i][k] = v[i - n / 2][k] + (class == DUPLICATE ? 0 : random_in(random, -1e-12, 1e-12));
+    if (class == DUPLICATE || class == NEAR_DUPLICATE)
+        pair_repeat(random, class == DUPLICATE ? 0 : 1e-12, v, n);
     return n;
 }
 
@@ -201,6 +210,8 @@ static inline void pair_pierce(struct random *random, struct pair *pair)
     for (int i = 0; i < pair->count; i++)
         lw_vec_add_scaled(weight[i] / sum, pair->points[i], inside);
     pair_point(random, 0.5, axis);
+    if (random_below(random, 4) == 0)
+        pair_edge(random, pair, axis);
     const double t = random_in(random, -0.1, 1.1);
     for (int k = 0; k < 3; k++) {
         pair->link.a[k] = inside[k] - t * axis[k];
@@ -220,7 +231,7 @@ static inline void pair_set_link(struct random *random, enum pair_class class, c
     for (int k = 0; k < 3; k++)
         pair->link.b[k] = pair->link.a[k] + (class == ZERO_LENGTH ? 0 : axis[k]);
     pair->link.r = random_in(random, 0.01, 0.15);
-    if (class == CORE_OVERLAP)
+    if (class == CORE_OVERLAP || (class >= FLAT && random_below(random, 3) == 0))
         pair_pierce(random, pair);
     if (class == FAR_APART) {
         pair_direction(random, direction);
