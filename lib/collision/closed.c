@@ -44,103 +44,49 @@ void lw_closed_sphere(const struct lw_capsule *link, const double c[3], double r
 
 // --- capsule ---
 
-// Two segments p + s u and q + t w, s and t in 0..1, with r = p - q.
-struct segments {
-    double u[3], w[3], r[3];
-    double uu, ww, uw, ur, wr;
-    double s, t; // best so far
-    double v[3]; // r + s u - t w, from the second to the first
-    double vv;
-};
-
 static double over(double value, double square)
 {
     return square > 0 ? value / square : 0;
 }
 
-// Keeps the pair s, t when it is nearer.
-static void try_pair(struct segments *g, double s, double t)
-{
-    double v[3];
-    for (int i = 0; i < 3; i++)
-        v[i] = g->r[i] + s * g->u[i] - t * g->w[i];
-    const double vv = lw_vec_dot(v, v);
-    if (vv >= g->vv)
-        return;
-    g->s = s;
-    g->t = t;
-    g->vv = vv;
-    memcpy(g->v, v, sizeof v);
-}
-
-// The best t for an s, and where that leaves the segment, the best s for the clamped t.
-static void try_s(struct segments *g, double s)
-{
-    const double free_t = over(g->uw * s + g->wr, g->ww), t = lw_closed_clamp(free_t, 0, 1);
-    if (t != free_t)
-        s = lw_closed_clamp(over(g->uw * t - g->ur, g->uu), 0, 1);
-    try_pair(g, s, t);
-}
-
-// The s nearest to the other line, by cross products: their error grows with 1 / angle, that of the products in
-// find_nearest with 1 / angle^2.
-static void try_crossing(struct segments *g)
-{
-    double n[3], wr[3];
-    lw_vec_cross(g->u, g->w, n);
-    lw_vec_cross(g->w, g->r, wr);
-    try_s(g, lw_closed_clamp(over(lw_vec_dot(wr, n), lw_vec_dot(n, n)), 0, 1));
-}
-
-static void find_nearest(struct segments *g)
-{
-    const double product = g->uu * g->ww, det = product - g->uw * g->uw;
-    if (det > 1e-6 * product) {
-        try_s(g, lw_closed_clamp((g->uw * g->wr - g->ur * g->ww) / det, 0, 1));
-        return;
-    }
-    // Nearly parallel, or of no length: the ends, each with the nearest point of the other, and one pair within.
-    try_pair(g, 0, lw_closed_clamp(over(g->wr, g->ww), 0, 1));
-    try_pair(g, 1, lw_closed_clamp(over(g->uw + g->wr, g->ww), 0, 1));
-    try_pair(g, lw_closed_clamp(over(-g->ur, g->uu), 0, 1), 0);
-    try_pair(g, lw_closed_clamp(over(g->uw - g->ur, g->uu), 0, 1), 1);
-    try_crossing(g);
-}
-
 // Direction out of two segments that meet: perpendicular to both, or to the longer one where they are parallel.
-static void crossing_normal(const struct segments *g, double n[3])
+//   cross  in  u x w
+static void crossing_normal(const double u[3], const double w[3], const double cross[3], double n[3])
 {
-    lw_vec_cross(g->u, g->w, n);
-    const double square = lw_vec_dot(n, n);
-    if (!(square > 1e-20 * g->uu * g->ww)) {
-        lw_closed_perpendicular(g->uu >= g->ww ? g->u : g->w, n);
+    const double uu = lw_vec_dot(u, u), ww = lw_vec_dot(w, w), square = lw_vec_dot(cross, cross);
+    if (!(square > 1e-20 * uu * ww)) {
+        lw_closed_perpendicular(uu >= ww ? u : w, n);
         return;
     }
     for (int i = 0; i < 3; i++)
-        n[i] /= sqrt(square);
+        n[i] = cross[i] / sqrt(square);
 }
 
-void lw_closed_capsule(const struct lw_capsule *link, const struct lw_capsule *other, struct lw_distance *out)
+// Segments p + s u and q + t w with r = p - q: s where the lines are nearest, from cross products, whose error grows
+// with 1 / angle only, of parallel lines any s; the best t for it, clamped; and the best s for that t.
+void lw_closed_segment(const struct lw_capsule *link, const double a[3], const double b[3], double radius,
+                       struct lw_distance *out)
 {
-    struct segments g = {.vv = INFINITY, .v = {NAN, NAN, NAN}};
-    double qa[3], n[3];
-    lw_vec_sub(link->b, link->a, g.u);
-    lw_vec_sub(other->b, other->a, g.w);
-    lw_vec_sub(link->a, other->a, g.r);
-    g.uu = lw_vec_dot(g.u, g.u);
-    g.ww = lw_vec_dot(g.w, g.w);
-    g.uw = lw_vec_dot(g.u, g.w);
-    g.ur = lw_vec_dot(g.u, g.r);
-    g.wr = lw_vec_dot(g.w, g.r);
-    find_nearest(&g);
-    for (int i = 0; i < 3; i++)
-        qa[i] = link->a[i] + g.s * g.u[i];
-    if (g.vv <= lw_touch_square) {
-        crossing_normal(&g, n);
-        lw_closed_core(qa, n, 0, (double[2]){link->r, other->r}, out);
+    double u[3], w[3], r[3], cross[3], wr[3], qa[3], v[3];
+    lw_vec_sub(link->b, link->a, u);
+    lw_vec_sub(b, a, w);
+    lw_vec_sub(link->a, a, r);
+    lw_vec_cross(u, w, cross);
+    lw_vec_cross(w, r, wr);
+    const double uw = lw_vec_dot(u, w);
+    const double first = lw_closed_clamp(over(lw_vec_dot(wr, cross), lw_vec_dot(cross, cross)), 0, 1);
+    const double t = lw_closed_clamp(over(uw * first + lw_vec_dot(w, r), lw_vec_dot(w, w)), 0, 1);
+    const double s = lw_closed_clamp(over(uw * t - lw_vec_dot(u, r), lw_vec_dot(u, u)), 0, 1);
+    for (int i = 0; i < 3; i++) {
+        qa[i] = link->a[i] + s * u[i];
+        v[i] = r[i] + s * u[i] - t * w[i];
+    }
+    if (lw_vec_dot(v, v) <= lw_touch_square) {
+        crossing_normal(u, w, cross, v);
+        lw_closed_core(qa, v, 0, (double[2]){link->r, radius}, out);
         return;
     }
-    lw_closed_apart(qa, g.v, link->r, other->r, out);
+    lw_closed_apart(qa, v, link->r, radius, out);
 }
 
 // --- half-space ---

@@ -23,9 +23,11 @@ static inline void lw_closed_along(const double a[3], const double b[3], double 
         out[i] = a[i] + t * (b[i] - a[i]);
 }
 
+// NaN stays NaN. Written so that it compiles to a maximum and a minimum, without a branch.
 static inline double lw_closed_clamp(double t, double low, double high)
 {
-    return t < low ? low : t > high ? high : t;
+    const double raised = low > t ? low : t;
+    return high < raised ? high : raised;
 }
 
 // Result for cores apart.
@@ -63,7 +65,8 @@ static inline void lw_closed_core(const double qa[3], const double n[3], double 
 void lw_closed_perpendicular(const double u[3], double out[3]);
 
 void lw_closed_sphere(const struct lw_capsule *link, const double c[3], double r, struct lw_distance *out);
-void lw_closed_capsule(const struct lw_capsule *link, const struct lw_capsule *other, struct lw_distance *out);
+void lw_closed_segment(const struct lw_capsule *link, const double a[3], const double b[3], double r,
+                       struct lw_distance *out);
 void lw_closed_halfspace(const struct lw_capsule *link, const struct lw_shape *shape, struct lw_distance *out);
 void lw_closed_box(const struct lw_capsule *link, const struct lw_shape *box, struct lw_distance *out);
 

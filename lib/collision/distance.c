@@ -78,13 +78,9 @@ void lw_distance_link(const struct lw_capsule *link, const struct lw_shape *shap
                       struct lw_distance *out)
 {
     struct lw_shape as_shape;
-    struct lw_capsule other;
     switch (shape->kind) {
     case LW_SPHERE: lw_closed_sphere(link, shape->c, shape->r, out); break;
-    case LW_CAPSULE:
-        other = lw_shape_capsule(shape);
-        lw_closed_capsule(link, &other, out);
-        break;
+    case LW_CAPSULE: lw_closed_segment(link, shape->segment.a, shape->segment.b, shape->r, out); break;
     case LW_BOX: lw_closed_box(link, shape, out); break;
     case LW_HULL: link_to_hull(link, shape, d_max, warm, out); break;
     case LW_HALFSPACE: lw_closed_halfspace(link, shape, out); break;
@@ -97,7 +93,7 @@ void lw_distance_link(const struct lw_capsule *link, const struct lw_shape *shap
 
 void lw_distance_capsules(const struct lw_capsule *capsule, const struct lw_capsule *other, struct lw_distance *out)
 {
-    lw_closed_capsule(capsule, other, out);
+    lw_closed_segment(capsule, other->a, other->b, other->r, out);
 }
 
 // --- pairs of any shapes ---

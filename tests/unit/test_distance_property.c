@@ -112,8 +112,8 @@ static void check_pair(const struct pair *pair, enum pair_class class, struct wo
         qa[k] = found.pa[k] + pair->link.r * found.n[k];
         qb[k] = found.pb[k] - pair->shape.r * found.n[k];
     }
-    const double off = fmax(fabs((double)oracle_distance(qa, 1, ends[0], 2)),
-                            fabs((double)oracle_distance(qb, 1, pair->points[0], pair->count)));
+    const double off = fmax((double)oracle_apart_points(qa, 1, ends[0], 2),
+                            (double)oracle_apart_points(qb, 1, pair->points[0], pair->count));
     const struct allowed allowed = allowed_of(class);
     // Written so that a NaN fails.
     const char *what = !(error <= allowed.error)         ? "distance off by"
