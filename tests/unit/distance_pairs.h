@@ -10,6 +10,7 @@
 #define LW_TESTS_DISTANCE_PAIRS_H
 
 #include "base/vec.h"           // lw_vec_*
+#include "collision/closed.h"   // lw_closed_along
 #include "collision/distance.h" // lw_distance_link
 #include "helpers.h"
 
@@ -102,15 +103,21 @@ static inline void pair_repeat(struct random *random, double noise, double v[LW_
             v[i][k] = v[i - n / 2][k] + random_in(random, -noise, noise);
 }
 
+// Half extents of a class's hulls.
+static inline void pair_half_extents(enum pair_class class, double half[3])
+{
+    const double scale = class == TINY ? 3e-4 : class == LARGE ? 9 : 0.3;
+    half[0] = class == NEEDLE ? 1 : scale;
+    half[1] = class == NEEDLE ? 1e-4 : scale;
+    half[2] = class == NEEDLE ? 1e-4 : class == PLATE ? 1e-7 : scale;
+}
+
 // Vertices of a hull about the origin, as its class wants them.
 static inline int pair_vertices(struct random *random, enum pair_class class, double v[LW_HULL_MAX][3])
 {
+    double half[3];
     const int n = class == FEW ? 1 + random_below(random, 5) : pair_hull_count(random);
-    const double scale = class == TINY ? 1e-3 : class == LARGE ? 30 : 1;
-    const double half[3] = {scale * (class == NEEDLE ? 1 : 0.3), scale * (class == NEEDLE ? 1e-4 : 0.3),
-                            scale * (class == NEEDLE  ? 1e-4
-                                     : class == PLATE ? 1e-7
-                                                      : 0.3)};
+    pair_half_extents(class, half);
     for (int i = 0; i < n; i++)
         for (int k = 0; k < 3; k++)
             v[i][k] = half[k] * random_in(random, -1, 1);
@@ -119,8 +126,7 @@ static inline int pair_vertices(struct random *random, enum pair_class class, do
         v[i][2] = height;
     // More than three points of the class FEW are on one line.
     for (int i = 2; class == FEW && n > 3 && i < n; i++)
-        for (int k = 0; k < 3; k++)
-            v[i][k] = v[0][k] + 0.25 * i * (v[1][k] - v[0][k]);
+        lw_closed_along(v[0], v[1], 0.25 * i, v[i]);
     if (class == DUPLICATE || class == NEAR_DUPLICATE)
         pair_repeat(random, class == DUPLICATE ? 0 : 1e-12, v, n);
     return n;
@@ -195,7 +201,8 @@ static inline void pair_edge(struct random *random, const struct pair *pair, dou
             out[k] = pair->shape.box.axes[3 * k + axis];
         return;
     }
-    lw_vec_sub(pair->points[pair->count - 1], pair->points[random_below(random, pair->count)], out);
+    const int last = pair->count > 0 ? pair->count - 1 : 0;
+    lw_vec_sub(pair->points[last], pair->points[random_below(random, last + 1)], out);
     if (!(lw_vec_norm(out) > 0))
         pair_direction(random, out);
 }

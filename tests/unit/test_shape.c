@@ -312,22 +312,22 @@ static void hulls_far_away_keep_their_digits(void **state)
     assert_true(shape.c[0] == 1000.5 && room[0] == -0.25 && room[1] == 0.25 && room[9] == 0.0625);
 }
 
-static void other_shapes_move_rigidly(void **state)
+static void capsules_and_customs_move_rigidly(void **state)
 {
     (void)state;
     struct random random = {10};
     for (int n = 0; n < 200; n++) {
         struct lw_pose pose;
         struct lw_shape shape;
-        double expected[3], point[3] = {0, 0, 0.2}, normal[3];
+        double a[3], b[3];
+        const double top[3] = {0, 0, 0.2}, bottom[3] = {0, 0, -0.2};
         random_pose(&random, 3, &pose);
+        transform(&pose, bottom, a);
+        transform(&pose, top, b);
         struct lw_solid solid = good(LW_CAPSULE);
         assert_int_equal(lw_shape_make(&solid, &pose, NULL, &shape, NULL), LW_OK);
-        transform(&pose, point, expected);
-        assert_all_near(shape.segment.b, expected, 3, 2e-15);
-        point[2] = -0.2;
-        transform(&pose, point, expected);
-        assert_all_near(shape.segment.a, expected, 3, 2e-15);
+        assert_all_near(shape.segment.a, a, 3, 2e-15);
+        assert_all_near(shape.segment.b, b, 3, 2e-15);
         assert_near(shape.bound, 0.3, 1e-15);
         const struct lw_capsule capsule = lw_shape_capsule(&shape);
         const struct lw_shape again = lw_shape_of_capsule(&capsule);
@@ -337,10 +337,28 @@ static void other_shapes_move_rigidly(void **state)
         assert_all_near(again.c, pose.p, 3, 2e-15);
         assert_near(again.bound, 0.3, 2e-15);
 
-        solid = good(LW_SPHERE);
+        solid = good(LW_CUSTOM);
+        solid.custom_centre[2] = -0.2;
+        assert_int_equal(lw_shape_make(&solid, &pose, NULL, &shape, NULL), LW_OK);
+        assert_all_near(shape.c, a, 3, 2e-15);
+        assert_true(shape.custom == &object);
+        assert_near(shape.bound, 1.1, 1e-15);
+    }
+}
+
+static void spheres_and_boxes_move_rigidly(void **state)
+{
+    (void)state;
+    struct random random = {11};
+    for (int n = 0; n < 200; n++) {
+        struct lw_pose pose;
+        struct lw_shape shape;
+        random_pose(&random, 3, &pose);
+        struct lw_solid solid = good(LW_SPHERE);
         assert_int_equal(lw_shape_make(&solid, &pose, NULL, &shape, NULL), LW_OK);
         assert_all_near(shape.c, pose.p, 3, 0);
         assert_all_near(shape.segment.a, pose.p, 3, 0); // the half length is not a sphere's
+        assert_all_near(shape.segment.b, pose.p, 3, 0);
         assert_near(shape.bound, 0.1, 0);
 
         solid = good(LW_BOX);
@@ -348,24 +366,26 @@ static void other_shapes_move_rigidly(void **state)
         assert_all_near(shape.box.axes, pose.r, 9, 1e-15);
         assert_all_near(shape.box.half, solid.half, 3, 0);
         assert_near(shape.bound, sqrt(0.14) + 0.1, 1e-15);
+    }
+}
 
-        // A point of the plane stays on it.
-        solid = good(LW_HALFSPACE);
+// A point of the plane stays on it.
+static void half_spaces_move_rigidly(void **state)
+{
+    (void)state;
+    struct random random = {12};
+    for (int n = 0; n < 200; n++) {
+        struct lw_pose pose;
+        struct lw_shape shape;
+        double point[3], moved[3];
+        const struct lw_solid solid = good(LW_HALFSPACE);
+        random_pose(&random, 3, &pose);
         assert_int_equal(lw_shape_make(&solid, &pose, NULL, &shape, NULL), LW_OK);
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++)
             point[i] = 0.5 * solid.normal[i] + (i == 0 ? 0.7 : 0);
-            normal[i] = shape.halfspace.m[i];
-        }
-        transform(&pose, point, expected);
-        assert_near(lw_vec_dot(normal, expected), shape.halfspace.o, 4e-15);
+        transform(&pose, point, moved);
+        assert_near(lw_vec_dot(shape.halfspace.m, moved), shape.halfspace.o, 4e-15);
         assert_true(isinf(shape.bound) && shape.r == 0);
-
-        solid = good(LW_CUSTOM);
-        solid.custom_centre[2] = -0.2;
-        assert_int_equal(lw_shape_make(&solid, &pose, NULL, &shape, NULL), LW_OK);
-        assert_all_near(shape.c, again.segment.a, 3, 2e-15);
-        assert_true(shape.custom == &object);
-        assert_near(shape.bound, 1.1, 1e-15);
     }
 }
 
@@ -381,7 +401,9 @@ int main(void)
         cmocka_unit_test(quaternions_turn_vectors),
         cmocka_unit_test(hulls_move_rigidly),
         cmocka_unit_test(hulls_far_away_keep_their_digits),
-        cmocka_unit_test(other_shapes_move_rigidly),
+        cmocka_unit_test(capsules_and_customs_move_rigidly),
+        cmocka_unit_test(spheres_and_boxes_move_rigidly),
+        cmocka_unit_test(half_spaces_move_rigidly),
     };
     return cmocka_run_group_tests_name("shape", tests, NULL, NULL);
 }
