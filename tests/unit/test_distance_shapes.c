@@ -187,14 +187,18 @@ static void check_custom(const struct lw_distance *found, const struct lw_distan
     check_identity(found, 2e-15);
 }
 
-// The witness point of the first shape is on its core.
-static void check_witness(const struct lw_distance *found, const struct pair *a)
+// The witness points are on the cores.
+static void check_witnesses(const struct lw_distance *found, const struct pair *a, const struct pair *b)
 {
-    double qa[3];
-    for (int k = 0; k < 3; k++)
+    double qa[3], qb[3];
+    for (int k = 0; k < 3; k++) {
         qa[k] = found->pa[k] + a->shape.r * found->n[k];
-    if (!(found->flags & LW_DISTANCE_NO_NORMAL))
-        assert_near((double)oracle_apart_points(qa, 1, a->points[0], a->count), 0, 1e-12);
+        qb[k] = found->pb[k] - b->shape.r * found->n[k];
+    }
+    if (found->flags & LW_DISTANCE_NO_NORMAL)
+        return;
+    assert_near((double)oracle_apart_points(qa, 1, a->points[0], a->count), 0, 1e-12);
+    assert_near((double)oracle_apart_points(qb, 1, b->points[0], b->count), 0, 1e-12);
 }
 
 // Spheres, capsules, boxes and hulls by their support functions alone, against a link and against other shapes.
@@ -227,7 +231,7 @@ static void custom_shapes_equal_the_built_in_ones(void **state)
         built_in = distance(&a.shape, &b.shape);
         found = distance(&custom_a, &custom_b);
         check_custom(&found, &built_in, a.shape.r + b.shape.r);
-        check_witness(&found, &a);
+        check_witnesses(&found, &a, &b);
         found = distance(&custom_a, &b.shape);
         check_custom(&found, &built_in, a.shape.r + b.shape.r);
         found = distance(&a.shape, &custom_b);
