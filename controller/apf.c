@@ -11,7 +11,7 @@
 
 #include "base/vec.h" // lw_vec_*
 
-#include <math.h> // fmax
+#include <math.h> // fmax, INFINITY
 
 static const double goal_reached = 1e-12; // m, no direction to pull in below this
 
@@ -42,8 +42,8 @@ static void repel(const struct lw_apf_params *params, const struct lw_obstacle *
 {
     double away[3], force[3] = {0};
     const double distance = lw_obstacle_distance(obstacle, x, away);
-    if (nearest->point == 0 || distance < nearest->distance)
-        *nearest = (struct lw_nearest){.distance = distance, .point = point, .obstacle = obstacle->id};
+    if (nearest->link == 0 || distance < nearest->clearance)
+        *nearest = (struct lw_nearest){.clearance = distance, .link = point, .obstacle = obstacle->id};
     const double size = lw_apf_repulsion(params, distance);
     if (size == 0.0)
         return;
@@ -55,7 +55,7 @@ static void apf_step(const struct lw_law_params *law, const struct lw_law_input 
 {
     const struct lw_apf_params *params = &law->apf;
     struct lw_wrench wrench = {0};
-    out->nearest = (struct lw_nearest){.distance = -1};
+    out->nearest = (struct lw_nearest){.clearance = (double)INFINITY};
 
     // Attraction at the tip, equation (5).
     double force[3];

@@ -50,6 +50,7 @@ static void on_obstacles(void *user, enum lw_channel channel, const union lw_mes
     if (!lw_refusals_note(&live->control->program->refusals, lw_verdict_of(status)))
         return;
     lw_heard_note(&live->heard, channel, message);
+    atomic_store(&live->world_heard_ns, lw_clock_mono_ns());
     struct lw_world *slot = lw_mailbox_slot(&live->world_box);
     *slot = live->world;
     lw_mailbox_publish(&live->world_box);
@@ -108,6 +109,8 @@ enum lw_status lw_live_subscribe(struct lw_live *live)
     lw_program_normal_thread();
     if (status == LW_OK)
         status = lw_program_subscribe(program, live->world_rx_bus, LW_CHANNEL_OBSTACLES, on_obstacles, live);
+    if (status == LW_OK)
+        status = lw_program_subscribe(program, live->world_rx_bus, LW_CHANNEL_HULL, on_obstacles, live);
     if (status == LW_OK)
         status = lw_program_subscribe(program, live->world_rx_bus, LW_CHANNEL_GOAL, on_request, live);
     if (status == LW_OK)

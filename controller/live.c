@@ -12,6 +12,7 @@
 #include "base/periodic.h" // lw_periodic_*
 #include "base/stop.h"     // lw_stop_signal
 
+#include <math.h>   // isfinite
 #include <stdlib.h> // EXIT_FAILURE
 
 static const int64_t report_period_ns = LW_NS_PER_S / 20;
@@ -24,7 +25,8 @@ static enum lw_run_state run_state(const struct lw_live *live, const struct lw_j
         return LW_STARTING;
     if (command->flags & LW_WAITING)
         return LW_RUN_WAITING;
-    return command->flags & (LW_STOPPED | LW_STALE | LW_NOT_FINITE | LW_FOREIGN) ? LW_STOPPING : LW_RUNNING;
+    return command->flags & (LW_STOPPED | LW_STALE | LW_NOT_FINITE | LW_FOREIGN | LW_CONTACT) ? LW_STOPPING
+                                                                                              : LW_RUNNING;
 }
 
 // Statistics and STATUS, once.
@@ -34,8 +36,14 @@ static void report(struct lw_live *live, int64_t now_ns)
     const struct lw_record *newest = lw_health_collect(&live->health);
     if (newest == NULL)
         return;
-    struct lw_report report = {.state = run_state(live, &newest->command),
-                               .distance = newest->command.nearest.distance};
+    const struct lw_joint_command *command = &newest->command;
+    const int64_t heard_ns = atomic_load(&live->world_heard_ns);
+    struct lw_report report = {.state = run_state(live, command),
+                               .clearance = command->nearest.clearance,
+                               .deviation = isfinite(command->deviation) ? command->deviation : 0,
+                               .stuck_since_ns = command->stuck_since_ns,
+                               .obstacle_count = command->obstacle_count,
+                               .world_age_ns = heard_ns > 0 ? newest->time_ns - heard_ns : -1};
     lw_program_report(program, live->status_bus, &live->health, &report);
     if (program->postmortem != NULL)
         lw_postmortem_watch(&live->postmortem, program, live->status_bus, &live->health, &live->heard, now_ns);

@@ -36,16 +36,17 @@ struct lw_live {
     _Alignas(LW_CACHE_LINE) struct lw_arrival state_slots[LW_MAILBOX_SLOTS];
     _Alignas(LW_CACHE_LINE) struct lw_world world_slots[LW_MAILBOX_SLOTS];
     _Alignas(LW_CACHE_LINE) struct lw_request request_slots[LW_MAILBOX_SLOTS];
-    struct lw_health health;           // rt -> main
-    struct lw_heard heard;             // world -> main
-    struct lw_postmortem postmortem;   // main
-    struct lw_lease lease;             // rx: the plant heard
-    struct lw_world world;             // world: its working copy
-    struct lw_request_memory requests; // world: those put into the mailbox
-    atomic_bool stopping;              // main -> rt: brake, then end
-    atomic_bool abandoned;             // main -> rt: end now, a second signal came
-    atomic_bool rt_done;               // rt -> all: at rest, or never moved
-    atomic_bool bus_failed;            // rx, world -> main
+    struct lw_health health;            // rt -> main
+    struct lw_heard heard;              // world -> main
+    struct lw_postmortem postmortem;    // main
+    struct lw_lease lease;              // rx: the plant heard
+    struct lw_world world;              // world: its working copy
+    atomic_int_fast64_t world_heard_ns; // world -> main: when the newest message about obstacles came, 0 = none
+    struct lw_request_memory requests;  // world: those put into the mailbox
+    atomic_bool stopping;               // main -> rt: brake, then end
+    atomic_bool abandoned;              // main -> rt: end now, a second signal came
+    atomic_bool rt_done;                // rt -> all: at rest, or never moved
+    atomic_bool bus_failed;             // rx, world -> main
 };
 
 // The threads; `user` is the struct lw_live.

@@ -53,7 +53,7 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
     struct lockstep *l = user;
     if (channel == LW_CHANNEL_JOINT_STATE)
         on_joint_state(l, &message->joint_state);
-    else if (channel == LW_CHANNEL_OBSTACLES)
+    else if (channel == LW_CHANNEL_OBSTACLES || channel == LW_CHANNEL_HULL)
         (void)lw_refusals_note(&l->control->program->refusals,
                                lw_verdict_of(lw_world_apply(&l->world, &message->obstacles)));
     else if (lw_request_is_new(&l->requests, &message->request)) // a repetition must not replace one not ticked yet
@@ -62,8 +62,8 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
 
 static enum lw_status subscribe(struct lockstep *l)
 {
-    static const enum lw_channel channels[] = {LW_CHANNEL_JOINT_STATE, LW_CHANNEL_OBSTACLES, LW_CHANNEL_GOAL,
-                                               LW_CHANNEL_STOP};
+    static const enum lw_channel channels[] = {LW_CHANNEL_JOINT_STATE, LW_CHANNEL_OBSTACLES, LW_CHANNEL_HULL,
+                                               LW_CHANNEL_GOAL, LW_CHANNEL_STOP};
     enum lw_status status = LW_OK;
     for (size_t i = 0; status == LW_OK && i < sizeof channels / sizeof channels[0]; i++)
         status = lw_program_subscribe(l->control->program, l->bus, channels[i], on_message, l);

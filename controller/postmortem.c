@@ -36,7 +36,7 @@ void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union 
     pthread_mutex_lock(&heard->lock);
     struct lw_heard_message *slot = &past->newest[past->next];
     // The oldest makes room: what it changed stays in the world before.
-    if (past->count == LW_HEARD_MAX && slot->channel == LW_CHANNEL_OBSTACLES)
+    if (past->count == LW_HEARD_MAX && (slot->channel == LW_CHANNEL_OBSTACLES || slot->channel == LW_CHANNEL_HULL))
         (void)(lw_world_apply(&past->before, &slot->message.obstacles) == LW_OK); // it was taken once already
     *slot = (struct lw_heard_message){.channel = (int)channel, .message = *message, .time_ns = lw_clock_mono_ns()};
     past->next = (past->next + 1) % LW_HEARD_MAX;
@@ -69,7 +69,7 @@ static int64_t newest_seq(const struct lw_world *world, int64_t owner)
 static int run_length(const struct lw_world *world, int i)
 {
     int n = 1;
-    while (n < LW_CHANGE_MAX && i + n < world->count && world->obstacle[i + n].session == world->obstacle[i].session)
+    while (n < LW_CHANGE_MAX && i + n < world->count && world->owner[i + n] == world->owner[i])
         n++;
     return n;
 }
@@ -81,10 +81,10 @@ static void write_before(struct writer *w, const struct lw_world *world, int64_t
     for (int i = 0; i < world->count; i += run_length(world, i)) {
         union lw_message message = {.obstacles = {.op = LW_UPSERT, .count = run_length(world, i)}};
         struct lw_obstacle_change *change = &message.obstacles;
-        change->stamp.session = world->obstacle[i].session;
+        change->stamp.session = world->owner[i];
         change->stamp.seq = newest_seq(world, change->stamp.session);
         for (int k = i + change->count; k < world->count; k += run_length(world, k))
-            change->stamp.seq -= world->obstacle[k].session == change->stamp.session;
+            change->stamp.seq -= world->owner[k] == change->stamp.session;
         memcpy(change->obstacle, &world->obstacle[i], (size_t)change->count * sizeof change->obstacle[0]);
         write_at(w, LW_CHANNEL_OBSTACLES, &message, time_ns);
     }

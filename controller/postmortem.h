@@ -10,6 +10,7 @@
 #ifndef LW_CONTROLLER_POSTMORTEM_H
 #define LW_CONTROLLER_POSTMORTEM_H
 
+#include "collision/world.h" // struct lw_world
 #include "program/health.h"  // struct lw_health
 #include "program/program.h" // struct lw_program
 

@@ -13,7 +13,7 @@
 #include "base/vec.h"         // lw_vec_*, lw_all_finite
 #include "controller/guard.h" // lw_guard_shape
 
-#include <math.h>   // NAN
+#include <math.h>   // NAN, INFINITY
 #include <string.h> // memcpy
 
 static const int64_t stale_after_ns = 20 * 1000 * 1000;
@@ -110,7 +110,7 @@ static enum lw_law_outcome ask_law(const struct lw_controller *config, const str
     }
     // Nothing is known then, neither the wish nor where the frames are.
     const double nan = (double)NAN;
-    *law = (struct lw_law_output){.qd = {nan, nan, nan, nan, nan, nan}, .nearest = {.distance = -1}};
+    *law = (struct lw_law_output){.qd = {nan, nan, nan, nan, nan, nan}, .nearest = {.clearance = (double)INFINITY}};
     for (int i = 0; i < LW_NJ; i++)
         frame[i] = (struct lw_pose){.p = {nan, nan, nan}};
     return LW_LAW_NOT_ASKED;
@@ -153,10 +153,12 @@ static void explain(const struct lw_controller_state *state, const struct lw_tic
     memcpy(out->goal, state->request.goal, sizeof out->goal);
     out->request = state->request.stamp;
     out->world = in->world->last;
+    out->world_channel = in->world->last_channel;
     out->world_version = in->world->version;
     out->obstacle_count = in->world->count;
     out->deviation = lw_vec_norm(to_goal);
     out->nearest = law->nearest;
+    out->self_clearance = (double)INFINITY;
     out->tick = state->tick;
     out->tick_ns = in->time_ns;
     out->state_age_ns = in->state_age_ns;

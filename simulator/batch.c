@@ -27,7 +27,7 @@ static void store(const struct lw_batch_result *result, int64_t row, const struc
     if (lw_arm_fk(config->arm, command->q, frame) == LW_OK)
         memcpy(&result->tip[row * 3], frame[LW_NJ - 1].p, sizeof frame->p);
     result->deviation[row] = command->deviation;
-    result->distance[row] = command->nearest.distance;
+    result->distance[row] = command->nearest.clearance;
     result->flags[row] = (int)command->flags;
 }
 

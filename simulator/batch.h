@@ -18,7 +18,7 @@ struct lw_batch_result {
     double *qd;        // [rows][6] rad/s, commanded at q
     double *tip;       // [rows][3] m
     double *deviation; // [rows] m, tip to goal
-    double *distance;  // [rows] m, smallest control point to obstacle surface; -1 without obstacles
+    double *distance;  // [rows] m, smallest control point to obstacle surface; infinite without obstacles
     int *flags;        // [rows] set of enum lw_flag
 };
 

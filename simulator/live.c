@@ -17,6 +17,7 @@
 #include "base/periodic.h" // lw_periodic_*
 #include "base/stop.h"     // lw_stop_signal
 
+#include <math.h>      // INFINITY
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
@@ -223,7 +224,7 @@ static void report(struct live *live, enum lw_plant_mode *before)
     if (newest == NULL)
         return;
     say_mode(live, &newest->state, before);
-    struct lw_report report = {.state = run_state(live, newest), .distance = -1};
+    struct lw_report report = {.state = run_state(live, newest), .clearance = (double)INFINITY, .world_age_ns = -1};
     lw_program_report(live->simulation->program, live->main_bus, &live->health, &report);
 }
 

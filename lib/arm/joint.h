@@ -39,16 +39,18 @@ enum lw_flag {
     LW_WAITING = 64,
     LW_FOREIGN = 128,
     LW_WARMING_UP = 256,
+    LW_LIMIT_CLEARANCE = 512,
+    LW_CONTACT = 1024,
 };
 
 // How a law fared in a tick.
-enum lw_law_outcome { LW_LAW_NOT_ASKED, LW_LAW_OK, LW_LAW_NO_NUMBER };
+enum lw_law_outcome { LW_LAW_NOT_ASKED, LW_LAW_OK, LW_LAW_NO_NUMBER, LW_LAW_STUCK };
 
-// Nearest pair of control point and obstacle.
+// Nearest pair of link and obstacle.
 struct lw_nearest {
-    double distance; // m to the obstacle's surface; -1 when there is no obstacle
-    int point;       // control point 1..6, 0 = none
-    int obstacle;    // id, 0 = none
+    double clearance; // m between their surfaces, negative inside; infinite when there is no obstacle
+    int link;         // 1..6, 0 = none
+    int obstacle;     // id, 0 = none
 };
 
 // Controller -> plant, every controller period: the command and its explanation.
@@ -66,11 +68,16 @@ struct lw_joint_command {
     double q[LW_NJ];         // rad, configuration it was computed for
     double goal[3];          // m
     struct lw_stamp request; // newest request obeyed (session and seq only)
-    struct lw_stamp world;   // newest obstacle message taken in (session and seq only)
+    struct lw_stamp world;   // newest message about obstacles taken in (session and seq only)
+    int world_channel;       // enum lw_world_channel: what it came by
     int64_t world_version;
-    int obstacle_count;
-    double deviation; // m, tip to goal
+    int obstacle_count; // without those that have expired
+    double deviation;   // m, tip to goal
     struct lw_nearest nearest;
+    double self_clearance;    // m, between two links watched against each other; infinite = none near
+    int self_link[2];         // 0 = none
+    int64_t stuck_since_ns;   // since when the tip has been stuck, 0 = it is not
+    double circulation[3];    // axis times gain, 0 = none
     int64_t tick;             // 1, 2, 3 ...
     int64_t tick_ns;          // the tick's own time
     int64_t state_age_ns;     // age of the state at tick_ns

@@ -20,6 +20,7 @@
     X(LW_E_DECODE, "message is of another type or version")                                                            \
     X(LW_E_OLD, "message was overtaken by a newer one")                                                                \
     X(LW_E_FULL, "no room left")                                                                                       \
+    X(LW_E_UNKNOWN, "vertices of this hull were never told")                                                           \
     X(LW_E_IO, "file or memory error")                                                                                 \
     X(LW_E_SCENE, "scene refused")                                                                                     \
     X(LW_E_BUS, "bus not available")

@@ -26,6 +26,7 @@ enum lw_verdict {
     LW_REFUSED_GUARD,
     LW_REFUSED_IDLE,
     LW_REFUSED_FULL,
+    LW_REFUSED_UNKNOWN,
     LW_REFUSED_COUNT
 };
 
@@ -39,6 +40,7 @@ static inline enum lw_verdict lw_verdict_of(enum lw_status status)
     case LW_E_ARGUMENT: return LW_REFUSED_RANGE;
     case LW_E_OLD: return LW_REFUSED_BACKWARDS;
     case LW_E_FULL: return LW_REFUSED_FULL;
+    case LW_E_UNKNOWN: return LW_REFUSED_UNKNOWN;
     default: return LW_REFUSED_TYPE;
     }
 }

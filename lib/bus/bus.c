@@ -76,14 +76,13 @@ static enum lw_status check_url(const char *url, struct sockaddr_in *address, st
     return LW_OK;
 }
 
-// OBSTACLES is shared by all robots of a bus; every other channel belongs to one.
 static void name_channels(struct lw_bus *bus, const char *name)
 {
     if (name != NULL && name[0] != '\0')
         snprintf(bus->name, sizeof bus->name, "%.30s_", name);
     for (int c = 0; c < LW_CHANNEL_COUNT; c++)
-        snprintf(bus->channel_name[c], LW_CHANNEL_NAME_MAX, "%s%s", c == LW_CHANNEL_OBSTACLES ? "" : bus->name,
-                 lw_wire_channel_name((enum lw_channel)c));
+        snprintf(bus->channel_name[c], LW_CHANNEL_NAME_MAX, "%s%s",
+                 lw_wire_is_shared((enum lw_channel)c) ? "" : bus->name, lw_wire_channel_name((enum lw_channel)c));
     snprintf(bus->scene_channel, LW_CHANNEL_NAME_MAX, "%sSCENE", bus->name);
 }
 

@@ -38,7 +38,11 @@ struct lw_report {
     int64_t refused[LW_REFUSED_COUNT];
     int64_t wake_late_ns[LW_PERCENTILES], exec_ns[LW_PERCENTILES], age_ns[LW_PERCENTILES];
     int64_t minor_faults, major_faults, allocations;
-    double distance;
+    double clearance;       // m, infinite = no obstacle
+    double deviation;       // m
+    int64_t stuck_since_ns; // 0 = not stuck
+    int obstacle_count;
+    int64_t world_age_ns; // -1 = nothing heard of obstacles
 };
 
 #endif

@@ -9,38 +9,44 @@
 #ifndef LW_BUS_WIRE_H
 #define LW_BUS_WIRE_H
 
-#include "arm/joint.h"       // struct lw_joint_state, struct lw_joint_command, struct lw_request
-#include "bus/report.h"      // struct lw_report
-#include "collision/world.h" // struct lw_obstacle_change
+#include "arm/joint.h"          // struct lw_joint_state, struct lw_joint_command, struct lw_request
+#include "bus/report.h"         // struct lw_report
+#include "collision/obstacle.h" // struct lw_obstacle_change
 
-#include <stdint.h> // uint32_t
+#include <stdbool.h> // bool
+#include <stdint.h>  // uint32_t
 
 enum lw_channel {
     LW_CHANNEL_JOINT_STATE,
     LW_CHANNEL_JOINT_COMMAND,
     LW_CHANNEL_OBSTACLES,
+    LW_CHANNEL_HULL,
     LW_CHANNEL_GOAL,
     LW_CHANNEL_STOP,
     LW_CHANNEL_WORLD,
+    LW_CHANNEL_WORLD_HULL,
     LW_CHANNEL_STATUS,
     LW_CHANNEL_PLANT_STATUS,
     LW_CHANNEL_COUNT
 };
 
-enum { LW_WIRE_MAX = 2048 }; // bytes, more than any message
+enum { LW_WIRE_MAX = 6144 }; // bytes, more than any message
 
 // Any message; the channel says which member holds it.
 union lw_message {
     struct lw_stamp stamp; // every member starts with its stamp
     struct lw_joint_state joint_state;
     struct lw_joint_command joint_command;
-    struct lw_obstacle_change obstacles; // OBSTACLES and WORLD
+    struct lw_obstacle_change obstacles; // OBSTACLES, HULL, WORLD and WORLD_HULL
     struct lw_request request;           // GOAL and STOP
     struct lw_report report;             // STATUS and PLANT_STATUS
 };
 
 // Name of a channel without a robot's prefix.
 const char *lw_wire_channel_name(enum lw_channel channel);
+
+// Whether all robots of a bus share a channel; every other channel belongs to one.
+bool lw_wire_is_shared(enum lw_channel channel);
 
 // Exact size in bytes of a channel's message, fingerprint included.
 uint32_t lw_wire_size(enum lw_channel channel);

@@ -12,7 +12,6 @@
 #include "base/vec.h"    // lw_vec_*
 
 #include <stdbool.h> // bool
-#include <stddef.h>  // NULL
 
 double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3], double away[3])
 {
@@ -31,10 +30,19 @@ static int find(const struct lw_world *world, int id)
     return -1;
 }
 
+static bool equal(const double *a, const double *b, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (a[i] != b[i])
+            return false;
+    return true;
+}
+
 static bool same(const struct lw_obstacle *a, const struct lw_obstacle *b)
 {
-    return a->id == b->id && a->session == b->session && a->radius == b->radius && a->p[0] == b->p[0] &&
-           a->p[1] == b->p[1] && a->p[2] == b->p[2];
+    return a->id == b->id && a->shape == b->shape && a->radius == b->radius && equal(a->p, b->p, 3) &&
+           equal(a->quat, b->quat, 4) && equal(a->size, b->size, 3) && equal(a->v, b->v, 3) &&
+           equal(a->omega, b->omega, 3);
 }
 
 static bool mentions(const struct lw_obstacle_change *change, int id)
@@ -45,6 +53,12 @@ static bool mentions(const struct lw_obstacle_change *change, int id)
     return false;
 }
 
+static void keep(struct lw_world *world, int from, int to)
+{
+    world->obstacle[to] = world->obstacle[from];
+    world->owner[to] = world->owner[from];
+}
+
 // Drops every obstacle that the change removes; returns how many. The order of the others is kept.
 static int drop(struct lw_world *world, const struct lw_obstacle_change *change)
 {
@@ -53,9 +67,9 @@ static int drop(struct lw_world *world, const struct lw_obstacle_change *change)
         const struct lw_obstacle *o = &world->obstacle[i];
         const bool listed = change->op != LW_CLEAR && mentions(change, o->id);
         const bool gone = change->op == LW_CLEAR || (change->op == LW_REMOVE && listed) ||
-                          (change->op == LW_REPLACE && o->session == change->stamp.session && !listed);
+                          (change->op == LW_REPLACE && world->owner[i] == change->stamp.session && !listed);
         if (!gone)
-            world->obstacle[kept++] = *o;
+            keep(world, i, kept++);
     }
     const int dropped = world->count - kept;
     world->count = kept;
@@ -65,9 +79,8 @@ static int drop(struct lw_world *world, const struct lw_obstacle_change *change)
 // Adds or overwrites one obstacle. Returns whether the world differs now; *full when there was no room.
 static bool put(struct lw_world *world, struct lw_obstacle obstacle, int64_t session, bool *full)
 {
-    obstacle.session = session;
     int at = find(world, obstacle.id);
-    if (at >= 0 && same(&world->obstacle[at], &obstacle))
+    if (at >= 0 && world->owner[at] == session && same(&world->obstacle[at], &obstacle))
         return false;
     if (at < 0 && world->count == LW_WORLD_MAX) {
         *full = true;
@@ -76,6 +89,7 @@ static bool put(struct lw_world *world, struct lw_obstacle obstacle, int64_t ses
     if (at < 0)
         at = world->count++;
     world->obstacle[at] = obstacle;
+    world->owner[at] = session;
     return true;
 }
 
@@ -102,6 +116,19 @@ static int64_t digest(const struct lw_world *world)
     return (int64_t)digest;
 }
 
+// Whether a change names a hull, without vertices, that is not there.
+static bool names_unknown_hull(const struct lw_world *world, const struct lw_obstacle_change *change)
+{
+    if (change->op == LW_REMOVE || change->op == LW_CLEAR || change->vertex_count > 0)
+        return false;
+    for (int i = 0; i < change->count; i++) {
+        const int at = change->obstacle[i].shape == LW_HULL ? find(world, change->obstacle[i].id) : -1;
+        if (change->obstacle[i].shape == LW_HULL && (at < 0 || world->obstacle[at].shape != LW_HULL))
+            return true;
+    }
+    return false;
+}
+
 enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     struct lw_world next = *world;
@@ -110,8 +137,11 @@ enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_c
         return LW_E_OLD;
     if (change->stamp.seq == sender->seq) {
         world->last = change->stamp;
+        world->last_channel = (int)lw_change_channel(change);
         return LW_OK;
     }
+    if (names_unknown_hull(world, change))
+        return LW_E_UNKNOWN;
     sender->seq = change->stamp.seq;
     bool changed = drop(&next, change) > 0;
 
@@ -125,6 +155,7 @@ enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_c
     // Hearing anything at all is version 1: an empty world is known, not unheard of.
     next.version += changed || next.version == 0;
     next.last = change->stamp;
+    next.last_channel = (int)lw_change_channel(change);
     next.digest = digest(&next);
     *world = next;
     return LW_OK;

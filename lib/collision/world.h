@@ -9,28 +9,10 @@
 #ifndef LW_COLLISION_WORLD_H
 #define LW_COLLISION_WORLD_H
 
-#include "base/stamp.h"  // struct lw_stamp
-#include "base/status.h" // enum lw_status
+#include "base/status.h"        // enum lw_status
+#include "collision/obstacle.h" // struct lw_obstacle, struct lw_obstacle_change
 
-enum { LW_WORLD_MAX = 256, LW_CHANGE_MAX = 32, LW_SENDERS_MAX = 32 };
-
-// A point (radius 0) or a sphere.
-struct lw_obstacle {
-    int id;          // > 0
-    double p[3];     // m, centre
-    double radius;   // m, >= 0
-    int64_t session; // source that owns it: the last one that sent this id
-};
-
-enum lw_change_op { LW_UPSERT, LW_REMOVE, LW_REPLACE, LW_CLEAR };
-
-// One change of the set, as a source sends it.
-struct lw_obstacle_change {
-    struct lw_stamp stamp;
-    enum lw_change_op op;
-    int count;
-    struct lw_obstacle obstacle[LW_CHANGE_MAX]; // session is ignored: the stamp names the source
-};
+enum { LW_WORLD_MAX = 256, LW_SENDERS_MAX = 32 };
 
 // Newest message of a sender.
 struct lw_sender {
@@ -41,9 +23,11 @@ struct lw_sender {
 struct lw_world {
     int64_t version;      // number of changes of the set so far; 0 = nothing heard
     struct lw_stamp last; // session and seq of the newest message taken in
+    int last_channel;     // enum lw_world_channel of that message
     int64_t digest;       // of the obstacles, in their order
     int count;
     struct lw_obstacle obstacle[LW_WORLD_MAX];
+    int64_t owner[LW_WORLD_MAX];             // session that sent the obstacle last
     struct lw_sender sender[LW_SENDERS_MAX]; // senders heard last; the oldest makes room
     int next_sender;
 };
@@ -55,8 +39,9 @@ double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3
 // Applies a change. The version grows only when the set really differs; a repeated message changes nothing.
 // An id belongs to the source that sent it last; REMOVE and CLEAR reach obstacles of every source. A message that comes
 // again is noted as the newest one heard, because its sender waits for that, and changes nothing.
-// Fails LW_E_OLD when its source has sent a newer message already, LW_E_FULL when the result would exceed LW_WORLD_MAX;
-// the world is unchanged then. Cost: O(changes * count).
+// Fails LW_E_OLD when its source has sent a newer message already, LW_E_FULL when the result would exceed LW_WORLD_MAX,
+// LW_E_UNKNOWN for a hull that is named without vertices and not there; the world is unchanged then. Cost: O(changes *
+// count).
 LW_MUST_CHECK enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change);
 
 #endif

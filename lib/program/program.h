@@ -85,7 +85,7 @@ void lw_program_realtime_thread(const struct lw_program *program, int behind);
 void lw_program_normal_thread(void);
 
 // Publishes what a program's health is on its channel, 20 times a second; says so when it cannot.
-//   report  in  state, distance and faults of its own; the rest is filled in
+//   report  in  state, faults and what is of its own; the rest is filled in
 void lw_program_report(struct lw_program *program, struct lw_bus *bus, struct lw_health *health,
                        struct lw_report *report);
 

@@ -209,7 +209,7 @@ void lw_scene_obstacles(const struct lw_scene *scene, struct lw_obstacle_change 
     *change = (struct lw_obstacle_change){.op = LW_REPLACE, .count = scene->obstacle_count};
     for (int i = 0; i < scene->obstacle_count; i++) {
         const struct lw_scene_obstacle *from = &scene->obstacle[i];
-        change->obstacle[i] =
-            (struct lw_obstacle){.id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .radius = from->radius};
+        change->obstacle[i] = (struct lw_obstacle){
+            .id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .quat = {1}, .radius = from->radius};
     }
 }

@@ -9,9 +9,9 @@
 #ifndef LW_SCENE_SCENE_H
 #define LW_SCENE_SCENE_H
 
-#include "arm/arm.h"         // LW_NJ, enum lw_robot
-#include "base/schema.h"     // struct lw_error, struct lw_key
-#include "collision/world.h" // LW_CHANGE_MAX, struct lw_obstacle_change
+#include "arm/arm.h"            // LW_NJ, enum lw_robot
+#include "base/schema.h"        // struct lw_error, struct lw_key
+#include "collision/obstacle.h" // LW_CHANGE_MAX, struct lw_obstacle_change
 
 #include <stdint.h> // int64_t
 

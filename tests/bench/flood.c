@@ -35,7 +35,7 @@ static void fill(struct flood *flood)
     union lw_message message = {.obstacles = {.op = LW_UPSERT, .count = LW_CHANGE_MAX}};
     message.stamp = (struct lw_stamp){.utime = lw_clock_utime(), .session = lw_clock_session(), .seq = 1};
     for (int i = 0; i < LW_CHANGE_MAX; i++)
-        message.obstacles.obstacle[i] = (struct lw_obstacle){.id = i + 1, .p = {1, 2, 3}, .radius = 0.1};
+        message.obstacles.obstacle[i] = (struct lw_obstacle){.id = i + 1, .p = {1, 2, 3}, .quat = {1}, .radius = 0.1};
     flood->size = lw_wire_encode(LW_CHANNEL_OBSTACLES, &message, flood->message);
 }
 

@@ -14,7 +14,7 @@
 #include <stddef.h> // size_t
 #include <stdint.h> // int64_t
 
-enum { PACKET_MAX = 4096 };
+enum { PACKET_MAX = 8192 };
 
 struct packet {
     unsigned char bytes[PACKET_MAX];

@@ -13,12 +13,20 @@
 #include <stdio.h>  // snprintf
 #include <string.h> // memcpy
 
-enum { HEAD = 8, NAME_MAX_BYTES = 200, FINGERPRINT_BYTES = 8, PLACE_OF_OP = 40, PLACE_OF_N = 41, PLACE_OF_IDS = 45 };
-enum { OBSTACLE_BYTES = 36, NOISE_MAX = 1500, PAYLOAD_MAX = 2048 };
+enum {
+    HEAD = 8,
+    NAME_MAX_BYTES = 200,
+    FINGERPRINT_BYTES = 8,
+    PLACE_OF_OP = 60,
+    PLACE_OF_N = 61,
+    PLACE_OF_IDS = 65,
+    PLACE_OF_VERTICES = 201
+};
+enum { OBSTACLE_BYTES = 141, NOISE_MAX = 1500, PAYLOAD_MAX = LW_WIRE_MAX };
 
 // What controller and plant listen to.
 static const enum lw_channel heard[] = {LW_CHANNEL_JOINT_STATE, LW_CHANNEL_JOINT_COMMAND, LW_CHANNEL_OBSTACLES,
-                                        LW_CHANNEL_GOAL, LW_CHANNEL_STOP};
+                                        LW_CHANNEL_HULL,        LW_CHANNEL_GOAL,          LW_CHANNEL_STOP};
 enum { HEARD = sizeof heard / sizeof heard[0] };
 
 static enum lw_channel any_channel(struct malformer *m)
@@ -44,7 +52,13 @@ static union lw_message rightful(const struct malformer *m, enum lw_channel chan
     } else if (channel == LW_CHANNEL_OBSTACLES) {
         message.obstacles.count = 3;
         for (int i = 0; i < 3; i++)
-            message.obstacles.obstacle[i] = (struct lw_obstacle){.id = 1000 + i, .p = {0.3, 0.3, 0.3}, .radius = 0.1};
+            message.obstacles.obstacle[i] =
+                (struct lw_obstacle){.id = 1000 + i, .p = {0.3, 0.3, 0.3}, .quat = {1}, .radius = 0.1};
+    } else if (channel == LW_CHANNEL_HULL) {
+        message.obstacles.count = 1;
+        message.obstacles.obstacle[0] =
+            (struct lw_obstacle){.id = 1003, .shape = LW_HULL, .p = {0.3, 0.3, 0.3}, .quat = {1}, .radius = 0.1};
+        message.obstacles.vertex_count = 8;
     }
     return message;
 }
@@ -178,12 +192,19 @@ void make_other_type(struct malformer *m, struct packet *out)
 
 // --- values ---
 
+// Any number of an obstacle that its receiver looks at.
+static double *double_of(struct malformer *m, struct lw_obstacle *o)
+{
+    double *const places[] = {&o->p[2], &o->quat[1], &o->radius, &o->v[0], &o->omega[1]};
+    return places[random_below(&m->random, 5)];
+}
+
 // Puts a number in place of one of a message that only lacks being wrong.
 static void make_with(struct malformer *m, double bad, struct packet *out)
 {
     static const enum lw_channel with_doubles[] = {LW_CHANNEL_JOINT_STATE, LW_CHANNEL_JOINT_COMMAND,
-                                                   LW_CHANNEL_OBSTACLES, LW_CHANNEL_GOAL};
-    const enum lw_channel channel = with_doubles[random_below(&m->random, 4)];
+                                                   LW_CHANNEL_OBSTACLES, LW_CHANNEL_HULL, LW_CHANNEL_GOAL};
+    const enum lw_channel channel = with_doubles[random_below(&m->random, 5)];
     const int j = random_below(&m->random, LW_NJ), axis = j % 3;
     union lw_message message = rightful(m, channel);
     switch (channel) {
@@ -191,8 +212,9 @@ static void make_with(struct malformer *m, double bad, struct packet *out)
         *(random_below(&m->random, 2) ? &message.joint_state.q[j] : &message.joint_state.qd[j]) = bad;
         break;
     case LW_CHANNEL_JOINT_COMMAND: message.joint_command.qd[j] = bad; break;
-    case LW_CHANNEL_OBSTACLES:
-        *(j < 3 ? &message.obstacles.obstacle[axis].p[axis] : &message.obstacles.obstacle[axis].radius) = bad;
+    case LW_CHANNEL_OBSTACLES: *double_of(m, &message.obstacles.obstacle[axis]) = bad; break;
+    case LW_CHANNEL_HULL:
+        *(j < 3 ? double_of(m, &message.obstacles.obstacle[0]) : &message.obstacles.vertex[4 * j]) = bad;
         break;
     default: message.request.goal[axis] = bad;
     }
@@ -214,8 +236,14 @@ void make_huge(struct malformer *m, struct packet *out)
 // Counts that lie, and ids that are none or stand twice.
 void make_count(struct malformer *m, struct packet *out)
 {
-    static const int32_t counts[] = {-1, INT32_MIN, LW_CHANGE_MAX + 1, 1000000, INT32_MAX};
+    static const int32_t counts[] = {-1, INT32_MIN, LW_HULL_MAX + 1, 1000000, INT32_MAX};
     static const int32_t ids[] = {0, -1, INT32_MIN, 1001};
+    if (random_below(&m->random, 3) == 0) {
+        pack_rightful(m, LW_CHANNEL_HULL, out);
+        put(out->bytes + payload_of(LW_CHANNEL_HULL) + PLACE_OF_VERTICES, (uint32_t)counts[random_below(&m->random, 5)],
+            4);
+        return;
+    }
     pack_rightful(m, LW_CHANNEL_OBSTACLES, out);
     unsigned char *payload = out->bytes + payload_of(LW_CHANNEL_OBSTACLES);
     const int which = random_below(&m->random, 9);
@@ -250,6 +278,8 @@ void make_out_of_range(struct malformer *m, struct packet *out)
         put_state_out_of_range(m, &message.joint_state);
     else if (channel == LW_CHANNEL_JOINT_COMMAND)
         message.joint_command.state_tick = INT64_MIN;
+    else if (channel == LW_CHANNEL_HULL)
+        message.obstacles.valid_for_ms = 100; // since when?
     pack(m, channel, &message, out);
     if (which == 2 && channel == LW_CHANNEL_OBSTACLES)
         out->bytes[payload_of(channel) + PLACE_OF_OP] = (unsigned char)(4 + random_below(&m->random, 250));

@@ -40,25 +40,33 @@ static struct lw_obstacle_change next_change(struct bytes *in, const struct lw_w
     const int first = next_byte(in), step = 1 + next_byte(in);
     for (int i = 0; i < change.count; i++)
         change.obstacle[i] = (struct lw_obstacle){
-            .id = 1 + (first + i * step) % IDS, .p = {variant, i, 0}, .radius = variant % 3, .session = -1};
+            .id = 1 + (first + i * step) % IDS, .p = {variant, i, 0}, .quat = {1}, .radius = variant % 3};
     return change;
 }
 
 // --- rules ---
 
-// Obstacles by id, NULL = none.
+// Obstacles and their owners by id, NULL = none.
 struct table {
     const struct lw_obstacle *at[IDS + 1];
+    int64_t owner[IDS + 1];
 };
 
-static struct table by_id(const struct lw_obstacle *obstacle, int count)
+//   owner   in  [count] NULL = session
+static struct table by_id(const struct lw_obstacle *obstacle, const int64_t *owner, int64_t session, int count)
 {
-    struct table table = {{NULL}};
+    struct table table = {0};
     for (int i = 0; i < count; i++) {
         CHECK(obstacle[i].id > 0 && obstacle[i].id <= IDS && table.at[obstacle[i].id] == NULL);
         table.at[obstacle[i].id] = &obstacle[i];
+        table.owner[obstacle[i].id] = owner != NULL ? owner[i] : session;
     }
     return table;
+}
+
+static struct table set_of(const struct lw_world *world)
+{
+    return by_id(world->obstacle, world->owner, 0, world->count);
 }
 
 static bool same(const struct lw_obstacle *a, const struct lw_obstacle *b)
@@ -66,61 +74,54 @@ static bool same(const struct lw_obstacle *a, const struct lw_obstacle *b)
     return a->p[0] == b->p[0] && a->p[1] == b->p[1] && a->p[2] == b->p[2] && a->radius == b->radius;
 }
 
-// What must stand under an id when a change was taken, NULL = nothing.
-//   old     what stood there before
-//   listed  what the change says of this id
-static const struct lw_obstacle *expect(const struct lw_obstacle_change *change, const struct lw_obstacle *old,
-                                        const struct lw_obstacle *listed)
+// Whether what stood under an id before stays there when a change is taken that does not overwrite it.
+static bool stays(const struct lw_obstacle_change *change, int64_t owner, bool is_listed)
 {
     switch (change->op) {
-    case LW_UPSERT: return listed != NULL ? listed : old;
-    case LW_REPLACE: return listed != NULL ? listed : old != NULL && old->session == change->stamp.session ? NULL : old;
-    case LW_REMOVE: return listed != NULL ? NULL : old;
+    case LW_UPSERT: return true;
+    case LW_REPLACE: return owner != change->stamp.session;
+    case LW_REMOVE: return !is_listed;
     case LW_CLEAR: break;
     }
-    return NULL;
+    return false;
 }
 
 // Works out the set that a change leaves, perhaps more than there is room for. Returns the number of obstacles.
 static int expect_all(const struct lw_world *before, const struct lw_obstacle_change *change, struct table *out)
 {
-    const struct table old = by_id(before->obstacle, before->count);
-    const struct table listed = by_id(change->obstacle, change->count);
+    const struct table old = set_of(before);
+    const struct table listed = by_id(change->obstacle, NULL, change->stamp.session, change->count);
+    const bool puts = change->op == LW_UPSERT || change->op == LW_REPLACE;
     int count = 0;
     for (int id = 1; id <= IDS; id++) {
-        out->at[id] = expect(change, old.at[id], listed.at[id]);
-        count += out->at[id] != NULL;
+        const bool new = puts && listed.at[id] != NULL;
+        const bool kept = !new && old.at[id] != NULL && stays(change, old.owner[id], listed.at[id] != NULL);
+        out->at[id] = new ? listed.at[id] : kept ? old.at[id] : NULL;
+        out->owner[id] = new ? listed.owner[id] : old.owner[id];
+        count += new || kept;
     }
     return count;
 }
 
-// The messages of this target name session -1: whoever sends an obstacle owns it.
-static int64_t owner_of(const struct lw_obstacle *obstacle, const struct lw_obstacle_change *change)
+static void check_set(const struct lw_world *after, const struct table *expected)
 {
-    return obstacle->session == -1 ? change->stamp.session : obstacle->session;
-}
-
-static void check_set(const struct lw_world *after, const struct lw_obstacle_change *change,
-                      const struct table *expected)
-{
-    const struct table found = by_id(after->obstacle, after->count);
+    const struct table found = set_of(after);
     for (int id = 1; id <= IDS; id++) {
         CHECK((found.at[id] != NULL) == (expected->at[id] != NULL));
         if (found.at[id] == NULL)
             continue;
         CHECK(same(found.at[id], expected->at[id]));
-        CHECK(found.at[id]->session == owner_of(expected->at[id], change));
+        CHECK(found.owner[id] == expected->owner[id]);
     }
 }
 
 // Whether what is expected is what stood there before.
-static bool is_same_set(const struct lw_world *before, const struct lw_obstacle_change *change,
-                        const struct table *expected)
+static bool is_same_set(const struct lw_world *before, const struct table *expected)
 {
-    const struct table old = by_id(before->obstacle, before->count);
+    const struct table old = set_of(before);
     for (int id = 1; id <= IDS; id++) {
         const struct lw_obstacle *a = old.at[id], *b = expected->at[id];
-        if ((a == NULL) != (b == NULL) || (a != NULL && (!same(a, b) || a->session != owner_of(b, change))))
+        if ((a == NULL) != (b == NULL) || (a != NULL && (!same(a, b) || old.owner[id] != expected->owner[id])))
             return false;
     }
     return true;
@@ -141,7 +142,7 @@ static void check_taken(const struct lw_world *before, const struct lw_world *af
 static void apply(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     static struct lw_world before;
-    struct table expected = {{NULL}};
+    struct table expected = {0};
     memcpy(&before, world, sizeof before);
     const int64_t newest = newest_of(&before, change->stamp.session);
     const int count = expect_all(&before, change, &expected);
@@ -153,8 +154,8 @@ static void apply(struct lw_world *world, const struct lw_obstacle_change *chang
         // Bytes, because nothing at all may have been touched.
         CHECK(memcmp((const void *)world, (const void *)&before, sizeof before) == 0);
     } else if (is_new) {
-        check_set(world, change, &expected);
-        check_taken(&before, world, change, is_same_set(&before, change, &expected));
+        check_set(world, &expected);
+        check_taken(&before, world, change, is_same_set(&before, &expected));
     } else {
         CHECK(world->version == before.version && world->count == before.count && world->digest == before.digest);
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ def obstacles(
     m.op, m.n = op, len(items)
     m.o = [wire.obstacle_t() for _ in range(32)]
     for slot, (number, p, radius) in zip(m.o, items, strict=False):
-        slot.id, slot.p, slot.radius = number, p, radius
+        slot.id, slot.p, slot.quat, slot.radius = number, p, [1, 0, 0, 0], radius
     return m
 
 
@@ -72,7 +73,7 @@ def status(session: int, mono_ns: int, ticks: int = 500, **fields: Any) -> Any:
     m = stamp(wire.status_t(), session, 1 + mono_ns // PERIOD_NS, mono_ns)
     m.state, m.realtime, m.period_ns, m.ticks = m.RUNNING, m.FIFO | m.LOCKED, PERIOD_NS, ticks
     m.wake_late_ns, m.exec_ns = [20_000, 40_000, 60_000, 80_000], [30_000, 50_000, 70_000, 90_000]
-    m.age_ns, m.allocations, m.distance = [4_000_000] * 4, -1, -1.0
+    m.age_ns, m.allocations, m.clearance = [4_000_000] * 4, -1, math.inf
     for name, value in fields.items():
         setattr(m, name, value)
     return m
@@ -114,7 +115,7 @@ class Run:
         m.tick, m.tick_ns = k + 1, k * PERIOD_NS
         m.wake_late_ns, m.previous_exec_ns, m.state_age_ns = 20_000 + k, 30_000 + k, 4_000_000
         origins = _native.Arm("ur5").frames(np.array(m.q))[1:, :3, 3]
-        m.distance = float(np.linalg.norm(origins - [1, 1, 0.4], axis=1).min())
+        m.clearance = float(np.linalg.norm(origins - [1, 1, 0.4], axis=1).min())
         m.deviation = float(np.linalg.norm(origins[-1] - m.goal))
         return m
 

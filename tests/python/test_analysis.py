@@ -49,7 +49,7 @@ def test_plain_run(tmp_path: Path) -> None:
     assert a.period == pytest.approx(PERIOD)
     assert a.tip[-1] == pytest.approx(tip, abs=1e-15)
     assert a.final_deviation == pytest.approx(run.commands[-1].deviation, abs=1e-15)
-    assert a.smallest_distance == pytest.approx(min(c.distance for c in run.commands), abs=1e-15)
+    assert a.smallest_distance == pytest.approx(min(c.clearance for c in run.commands), abs=1e-15)
     assert a.distance_check < 1e-15
     # The tip turns about axis 1 at a constant radius.
     assert a.tip_path_length == pytest.approx(0.5 * 0.4 * np.hypot(*tip[:2]), rel=1e-4)

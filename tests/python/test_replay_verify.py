@@ -16,6 +16,8 @@ from leeway.replay.ticks import FILLED_BY_PROCESS, Replay, spans
 from leeway.replay.verify import ControllerResult, Verification, verify
 
 TICKS = 50
+# In OBSTACLES: fingerprint, header, owner, time, expiry, op, n, id and shape of the first entry.
+FIRST_P = 8 + 32 + 8 + 8 + 4 + 1 + 4 + 4 + 1
 
 
 def verified(log: Messages, folder: Path) -> Verification:
@@ -247,8 +249,8 @@ def test_a_joint_state_of_another_layout(tmp_path: Path) -> None:
 def test_a_bit_of_an_obstacle(tmp_path: Path, byte: int, axis: int) -> None:
     log = usual()
     place = places(log, "OBSTACLES")[0]
-    # fingerprint, header, op, n, then the first entry: id, p, radius
-    at = 8 + 32 + 1 + 4 + 4 + 8 * axis + byte
+    # after p come the four numbers of the quaternion, then the radius
+    at = FIRST_P + 8 * (7 if axis == 3 else axis) + byte
     c = only(result := verified(flip(log, place, at), tmp_path))
     assert c.first is not None
     assert (c.first.tick, result.result) == (5, "differs")
@@ -263,7 +265,7 @@ def test_a_bit_of_a_repetition_that_changed_nothing(tmp_path: Path) -> None:
     for seq in (1, 2, 3):
         r.obstacles(7, seq, [(1, (0.6, -0.5, 0.5), 0.1)])
         r.tick(4)
-    c = only(result := verified(flip(r.log, places(r.log, "OBSTACLES")[1], 60), tmp_path))
+    c = only(result := verified(flip(r.log, places(r.log, "OBSTACLES")[1], FIRST_P + 11), tmp_path))
     assert c.first is not None
     assert (c.first.tick, c.differing, result.result) == (5, 4, "differs")
     assert "OBSTACLES id 1: p[1]" in [change.name for change in c.first.changed]

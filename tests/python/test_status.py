@@ -27,7 +27,7 @@ def message(session: int = 7, mono_ns: int = 0, ticks: int = 0, **fields: Any) -
     made.h = header(session, 1)
     made.h.mono_ns = mono_ns
     made.state, made.period_ns, made.ticks = made.RUNNING, 2_000_000, ticks
-    made.distance = -1.0
+    made.clearance = math.inf
     for name, value in fields.items():
         setattr(made, name, value)
     return made
@@ -75,20 +75,20 @@ def test_a_message_in_words() -> None:
         wake_late_ns=[1500, 2500, 3500, 921930],
         allocations=0,
         minor_faults=5,
-        distance=-0.02,
+        clearance=-0.02,
     )
     found = status.status_of(wire.status_t.decode(sent.encode()))
     assert (found.state, found.faults, found.realtime) == ("running", ["unsent"], ["locked"])
     assert found.faults_ever == ["bad_input", "unsent"]
     assert found.wake_late_us == status.Percentiles(1.5, 2.5, 3.5, 921.93)
     assert (found.rate_hz, found.minor_faults, found.allocations) == (500.0, 5, 0)
-    assert found.distance == -0.02  # inside of an obstacle, and not the mark for none
+    assert found.clearance == -0.02  # inside of an obstacle
 
 
-@pytest.mark.parametrize("distance", [-1.0, math.nan, math.inf])
+@pytest.mark.parametrize("distance", [math.nan, math.inf])
 def test_no_distance_no_rate_no_count(distance: float) -> None:
-    found = status.status_of(message(distance=distance, period_ns=0, allocations=-1))
-    assert (found.distance, found.rate_hz, found.allocations) == (None, 0.0, None)
+    found = status.status_of(message(clearance=distance, period_ns=0, allocations=-1))
+    assert (found.clearance, found.rate_hz, found.allocations) == (None, 0.0, None)
     json.dumps(found.to_json(), allow_nan=False)
 
 

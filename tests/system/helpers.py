@@ -23,6 +23,7 @@ TYPES = {
     "JOINT_STATE": wire.joint_state_t,
     "JOINT_COMMAND": wire.joint_command_t,
     "OBSTACLES": wire.obstacles_t,
+    "HULL": wire.hull_t,
     "GOAL": wire.goal_t,
     "SCENE": wire.scene_t,
     "STATUS": wire.status_t,

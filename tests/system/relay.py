@@ -26,6 +26,7 @@ import time
 ROUTES = {
     "JOINT_STATE": (True, True),
     "OBSTACLES": (True, False),
+    "HULL": (True, False),
     "GOAL": (True, False),
     "STOP": (True, False),
     "JOINT_COMMAND": (False, True),

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.usefixtures("private_network")
 
 PACKETS = int(os.environ.get("LEEWAY_MALFORMED_PACKETS", "100000"))
 GOAL = (0.25, -0.6, 0.25)  # the scene's own
-HEARD = ("JOINT_STATE", "JOINT_COMMAND", "OBSTACLES", "GOAL", "STOP")
+HEARD = ("JOINT_STATE", "JOINT_COMMAND", "OBSTACLES", "HULL", "GOAL", "STOP")
 STATUS_OF = {"leeway-controller": "STATUS", "leeway-simulator": "PLANT_STATUS"}
 
 # Kind -> reasons for which every packet of it is refused; none: the kernel's filter lets none in.

@@ -124,7 +124,15 @@ def test_only_what_has_a_route_is_forwarded():
     buses = (Bus(GROUP, PLANT_PORT), Bus(GROUP, CONTROLLER_PORT))
     with relaying(seed=3) as relay:
         relay.suffer(CUT)
-        for channel in ("JOINT_STATE", "OBSTACLES", "GOAL", "STOP", "JOINT_COMMAND", "STATUS"):
+        for channel in (
+            "JOINT_STATE",
+            "OBSTACLES",
+            "HULL",
+            "GOAL",
+            "STOP",
+            "JOINT_COMMAND",
+            "STATUS",
+        ):
             for bus in buses:
                 bus.send(_packet(channel, 9))
         for noise in (b"", b"LC02", b"LC02 nothing", b"LC020000GOAL\0short", b"LC030000GOAL\0"):
@@ -133,6 +141,7 @@ def test_only_what_has_a_route_is_forwarded():
     assert {name: len(them) for name, them in done["delivered"].items()} == {
         "JOINT_STATE": 0,
         "OBSTACLES": 1,
+        "HULL": 1,
         "GOAL": 1,
         "STOP": 1,
         "JOINT_COMMAND": 0,

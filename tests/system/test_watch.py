@@ -68,8 +68,8 @@ def test_both_programs_are_told(root: Path) -> None:
         assert one["ticks"] > 0
         assert one["exec_us"]["p50"] > 0
         assert ("fifo" in one["realtime"]) == try_fifo(80)
-    assert controller["distance"] > 0
-    assert simulator["distance"] is None
+    assert controller["clearance"] > 0
+    assert simulator["clearance"] is None
     assert table.stdout.splitlines()[0].split() == ["controller", "simulator"]
     assert "\x1b" not in table.stdout
 

@@ -11,7 +11,7 @@
 
 #include "helpers.h"
 
-enum { HEAD = 8, PACKET_MAX = 4096 };
+enum { HEAD = 8, PACKET_MAX = 8192 };
 
 #define NAME_63 "ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz_012345678"
 

@@ -58,9 +58,9 @@ static inline void tick_for(struct rig *rig, int ticks)
 
 static inline struct lw_report report(struct rig *rig)
 {
-    struct lw_report out = {.state = LW_RUNNING, .distance = 0.25};
+    struct lw_report out = {.state = LW_RUNNING, .clearance = 0.25};
     lw_health_report(&rig->health, &rig->refusals, &out);
-    assert_true(out.state == LW_RUNNING && out.distance == 0.25); // these are the program's own
+    assert_true(out.state == LW_RUNNING && out.clearance == 0.25); // these are the program's own
     return out;
 }
 

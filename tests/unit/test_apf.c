@@ -212,7 +212,7 @@ static void joints_follow_the_sum_of_transposed_jacobians(void **state)
     for (int n = 0; n < 500; n++) {
         static struct scene_of_balls s;
         double expected[LW_NJ] = {0}, force[3], scale = 1;
-        struct lw_nearest nearest = {.distance = -1};
+        struct lw_nearest nearest = {.clearance = HUGE_VAL};
         random_scene(&random, &s);
         lw_apf_attraction(&s.law.apf, s.frame[5].p, s.goal, force);
         add_joint_effect(&s, LW_NJ, force, expected);
@@ -223,13 +223,13 @@ static void joints_follow_the_sum_of_transposed_jacobians(void **state)
                 lw_vec_add_scaled(lw_apf_repulsion(&s.law.apf, d), away, push);
                 scale += lw_vec_norm(push);
                 add_joint_effect(&s, point, push, expected);
-                if (point > 1 && (nearest.point == 0 || d < nearest.distance))
-                    nearest = (struct lw_nearest){.distance = d, .point = point, .obstacle = 10 + k};
+                if (point > 1 && (nearest.link == 0 || d < nearest.clearance))
+                    nearest = (struct lw_nearest){.clearance = d, .link = point, .obstacle = 10 + k};
             }
         const struct lw_law_output out = step(&s);
         assert_all_near(out.qd, expected, LW_NJ, 1e-12 * scale);
-        assert_near(out.nearest.distance, nearest.distance, 0);
-        assert_int_equal(out.nearest.point, nearest.point);
+        assert_near(out.nearest.clearance, nearest.clearance, 0);
+        assert_int_equal(out.nearest.link, nearest.link);
         assert_int_equal(out.nearest.obstacle, nearest.obstacle);
     }
 }
@@ -248,8 +248,8 @@ static void an_obstacle_on_a_control_point_stays_finite(void **state)
         s.world.obstacle[0].radius = n % 3;
         const struct lw_law_output out = step(&s);
         assert_true(lw_all_finite(out.qd, LW_NJ));
-        assert_near(out.nearest.distance, -(n % 3), 0);
-        assert_int_equal(out.nearest.point, 2 + n % 5);
+        assert_near(out.nearest.clearance, -(n % 3), 0);
+        assert_int_equal(out.nearest.link, 2 + n % 5);
     }
 }
 

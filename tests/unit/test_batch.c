@@ -125,7 +125,7 @@ static void a_scene_without_obstacles_runs(void **state)
     static struct run run;
     assert_int_equal(run_scene(&scene, &run), LW_OK);
     for (int k = 0; k < ROWS; k++)
-        assert_true(run.distance[k] == -1 && run.flags[k] == 0);
+        assert_true(run.distance[k] == HUGE_VAL && run.flags[k] == 0);
 }
 
 static void a_scene_of_no_robot_is_refused(void **state)

@@ -194,7 +194,7 @@ static void a_position_that_is_no_number_brakes(void **state)
         go_for(rig, 100);
         rig->joint.q[j] = j % 2 ? NO_NUMBER : HUGE_VAL;
         check_brakes_to_rest(rig, LW_NOT_FINITE);
-        assert_int_equal(rig->out.nearest.point, 0);
+        assert_int_equal(rig->out.nearest.link, 0);
     }
 }
 
@@ -309,7 +309,7 @@ static void the_explanation_echoes_the_input(void **state)
     struct lw_law_output law;
     rig->config.law->step(&rig->config.params, &in, &law);
     assert_same_bits(out->qd_law, law.qd, sizeof law.qd);
-    assert_near(out->nearest.distance, law.nearest.distance, 0);
+    assert_near(out->nearest.clearance, law.nearest.clearance, 0);
     assert_int_equal(out->nearest.obstacle, 33);
 }
 

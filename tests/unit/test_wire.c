@@ -10,28 +10,14 @@
 #include "helpers.h"
 #include "wire_messages.h" // make, decode
 
+#include <leeway_hull_t.h>          // constants
 #include <leeway_joint_command_t.h> // the explanation, which lw_wire_decode leaves to logs
 #include <leeway_obstacles_t.h>     // constants
 #include <leeway_joint_state_t.h>   // constants
 #include <leeway_scene_t.h>         // fingerprint
 
-enum { PLACE_OF_OP = 8 + 4 * 8, PLACE_OF_MODE = PLACE_OF_OP }; // behind fingerprint and header
-
-// Puts each bad value in place of a double of a valid message: beyond a limit, and no number.
-static void check_double(enum lw_channel channel, const union lw_message *m, double *place, double limit)
-{
-    const double before = *place;
-    const double out_of_range[] = {nextafter(limit, 1e9), -nextafter(limit, 1e9), 1e9, -1.7e308};
-    const double no_number[] = {NO_NUMBER, -NO_NUMBER, HUGE_VAL, -HUGE_VAL};
-    for (int i = 0; i < 4; i++) {
-        *place = out_of_range[i];
-        check_message(channel, m, LW_E_ARGUMENT);
-        *place = no_number[i];
-        check_message(channel, m, LW_E_NOT_FINITE);
-    }
-    *place = before;
-    check_message(channel, m, LW_OK);
-}
+// Behind fingerprint and header.
+enum { PLACE_OF_MODE = 8 + 4 * 8, PLACE_OF_OP = PLACE_OF_MODE + 2 * 8 + 4, PLACE_OF_SHAPE = PLACE_OF_OP + 1 + 4 + 4 };
 
 // --- pins ---
 
@@ -45,10 +31,11 @@ static void sizes_and_fingerprints_are_pinned(void **state)
         uint32_t size;
         uint64_t fingerprint;
     } pins[LW_CHANNEL_COUNT] = {
-        {"JOINT_STATE", 169, UINT64_C(0x81b22a7757065507)}, {"JOINT_COMMAND", 378, UINT64_C(0x196dfb26cc0a9b77)},
-        {"OBSTACLES", 1197, UINT64_C(0x3cf45f88e3722515)},  {"GOAL", 64, UINT64_C(0xe5b8f4c1200087cc)},
-        {"STOP", 40, UINT64_C(0xf578849c63c10feb)},         {"WORLD", 1197, UINT64_C(0x3cf45f88e3722515)},
-        {"STATUS", 381, UINT64_C(0xdd9967741e39c9dc)},      {"PLANT_STATUS", 381, UINT64_C(0xdd9967741e39c9dc)}};
+        {"JOINT_STATE", 169, UINT64_C(0x81b22a7757065507)}, {"JOINT_COMMAND", 427, UINT64_C(0xbd32b14dc2d7235f)},
+        {"OBSTACLES", 4577, UINT64_C(0xe6cf099fa8629ab6)},  {"HULL", 1741, UINT64_C(0xaa6598ee8beab4fd)},
+        {"GOAL", 64, UINT64_C(0xe5b8f4c1200087cc)},         {"STOP", 40, UINT64_C(0xf578849c63c10feb)},
+        {"WORLD", 4577, UINT64_C(0xe6cf099fa8629ab6)},      {"WORLD_HULL", 1741, UINT64_C(0xaa6598ee8beab4fd)},
+        {"STATUS", 409, UINT64_C(0xef85fd1dcf2fe851)},      {"PLANT_STATUS", 409, UINT64_C(0xef85fd1dcf2fe851)}};
     for (int c = 0; c < LW_CHANNEL_COUNT; c++) {
         const enum lw_channel channel = (enum lw_channel)c;
         assert_string_equal(lw_wire_channel_name(channel), pins[c].name);
@@ -73,11 +60,17 @@ static void constants_are_those_of_the_wire(void **state)
     assert_int_equal(LW_WAITING, LEEWAY_JOINT_COMMAND_T_WAITING);
     assert_int_equal(LW_FOREIGN, LEEWAY_JOINT_COMMAND_T_FOREIGN);
     assert_int_equal(LW_WARMING_UP, LEEWAY_JOINT_COMMAND_T_WARMING_UP);
+    assert_int_equal(LW_LIMIT_CLEARANCE, LEEWAY_JOINT_COMMAND_T_LIMIT_CLEARANCE);
+    assert_int_equal(LW_CONTACT, LEEWAY_JOINT_COMMAND_T_CONTACT);
     assert_int_equal(LW_COMMAND_IDLE, LEEWAY_JOINT_COMMAND_T_IDLE);
     assert_int_equal(LW_COMMAND_VELOCITY, LEEWAY_JOINT_COMMAND_T_VELOCITY);
     assert_int_equal(LW_LAW_NOT_ASKED, LEEWAY_JOINT_COMMAND_T_NOT_ASKED);
     assert_int_equal(LW_LAW_OK, LEEWAY_JOINT_COMMAND_T_OK);
     assert_int_equal(LW_LAW_NO_NUMBER, LEEWAY_JOINT_COMMAND_T_NO_NUMBER);
+    assert_int_equal(LW_LAW_STUCK, LEEWAY_JOINT_COMMAND_T_STUCK);
+    assert_int_equal(LW_WORLD_NONE, LEEWAY_JOINT_COMMAND_T_NONE);
+    assert_int_equal(LW_WORLD_OBSTACLES, LEEWAY_JOINT_COMMAND_T_OBSTACLES);
+    assert_int_equal(LW_WORLD_HULL, LEEWAY_JOINT_COMMAND_T_HULL);
     assert_int_equal(LW_PLANT_HOLD, LEEWAY_JOINT_STATE_T_HOLD);
     assert_int_equal(LW_PLANT_MOVING, LEEWAY_JOINT_STATE_T_MOVING);
     assert_int_equal(LW_PLANT_STOPPING, LEEWAY_JOINT_STATE_T_STOPPING);
@@ -87,6 +80,12 @@ static void constants_are_those_of_the_wire(void **state)
     assert_int_equal(LW_REPLACE, LEEWAY_OBSTACLES_T_REPLACE);
     assert_int_equal(LW_CLEAR, LEEWAY_OBSTACLES_T_CLEAR);
     assert_int_equal(LW_CHANGE_MAX, LEEWAY_OBSTACLES_T_MAX);
+    assert_int_equal(LW_HULL_MAX, LEEWAY_HULL_T_MAX);
+    assert_int_equal(LW_SPHERE, LEEWAY_OBSTACLE_T_SPHERE);
+    assert_int_equal(LW_CAPSULE, LEEWAY_OBSTACLE_T_CAPSULE);
+    assert_int_equal(LW_BOX, LEEWAY_OBSTACLE_T_BOX);
+    assert_int_equal(LW_HULL, LEEWAY_OBSTACLE_T_HULL);
+    assert_int_equal(LW_HALFSPACE, LEEWAY_OBSTACLE_T_HALFSPACE);
 }
 
 // --- what is valid survives ---
@@ -138,14 +137,11 @@ static void the_fields_of_obstacles_and_requests_keep_their_places(void **state)
         in = make(&random, LW_CHANNEL_OBSTACLES);
         size = lw_wire_encode(LW_CHANNEL_OBSTACLES, &in, data);
         assert_int_equal(decode(LW_CHANNEL_OBSTACLES, data, size, &out), LW_OK);
-        assert_int_equal(out.obstacles.op, in.obstacles.op);
-        assert_int_equal(out.obstacles.count, in.obstacles.count);
-        for (int i = 0; i < in.obstacles.count; i++) {
-            assert_int_equal(out.obstacles.obstacle[i].id, in.obstacles.obstacle[i].id);
-            assert_same_bits(out.obstacles.obstacle[i].p, in.obstacles.obstacle[i].p,
-                             sizeof in.obstacles.obstacle[i].p);
-            assert_same_bits(&out.obstacles.obstacle[i].radius, &in.obstacles.obstacle[i].radius, sizeof(double));
-        }
+        assert_same_bits(&out.obstacles, &in.obstacles, sizeof in.obstacles); // no padding, unused ones are 0
+        in = make(&random, LW_CHANNEL_HULL);
+        size = lw_wire_encode(LW_CHANNEL_HULL, &in, data);
+        assert_int_equal(decode(LW_CHANNEL_HULL, data, size, &out), LW_OK);
+        assert_same_bits(&out.obstacles, &in.obstacles, sizeof in.obstacles);
         in = make(&random, LW_CHANNEL_GOAL);
         size = lw_wire_encode(LW_CHANNEL_GOAL, &in, data);
         assert_int_equal(decode(LW_CHANNEL_GOAL, data, size, &out), LW_OK);
@@ -157,40 +153,47 @@ static void the_fields_of_obstacles_and_requests_keep_their_places(void **state)
     }
 }
 
+// Every field another number.
+static const union lw_message told = {.joint_command = {.stamp = {1, 2, 3, 4},
+                                                        .plant_session = 5,
+                                                        .state_seq = 6,
+                                                        .state_tick = 7,
+                                                        .state_mono_ns = 8,
+                                                        .mode = LW_COMMAND_VELOCITY,
+                                                        .flags = 2047,
+                                                        .law_outcome = LW_LAW_NO_NUMBER,
+                                                        .qd = {1, 2, 3, 4, 5, 6},
+                                                        .qd_law = {7, 8, 9, 10, 11, 12},
+                                                        .q = {-1, -2, -3, -4, -5, -6},
+                                                        .goal = {21, 22, 23},
+                                                        .request = {91, 92, 31, 32},
+                                                        .world = {93, 94, 33, 34},
+                                                        .world_channel = 2,
+                                                        .world_version = 35,
+                                                        .obstacle_count = 36,
+                                                        .deviation = 37,
+                                                        .nearest = {38, 39, 40},
+                                                        .self_clearance = 49,
+                                                        .self_link = {50, 51},
+                                                        .stuck_since_ns = 52,
+                                                        .circulation = {53, 54, 55},
+                                                        .tick = 41,
+                                                        .tick_ns = 42,
+                                                        .state_age_ns = 43,
+                                                        .input_digest = 44,
+                                                        .compute_ns = 45,
+                                                        .wake_late_ns = 46,
+                                                        .previous_exec_ns = 47,
+                                                        .skipped = 48}};
+
 // The plant takes what it needs of a command; the explanation reaches the log field by field.
 static void the_explanation_of_a_command_reaches_the_log(void **state)
 {
     (void)state;
-    union lw_message m = {.joint_command = {.stamp = {1, 2, 3, 4},
-                                            .plant_session = 5,
-                                            .state_seq = 6,
-                                            .state_tick = 7,
-                                            .state_mono_ns = 8,
-                                            .mode = LW_COMMAND_VELOCITY,
-                                            .flags = 511,
-                                            .law_outcome = LW_LAW_NO_NUMBER,
-                                            .qd = {1, 2, 3, 4, 5, 6},
-                                            .qd_law = {7, 8, 9, 10, 11, 12},
-                                            .q = {-1, -2, -3, -4, -5, -6},
-                                            .goal = {21, 22, 23},
-                                            .request = {91, 92, 31, 32},
-                                            .world = {93, 94, 33, 34},
-                                            .world_version = 35,
-                                            .obstacle_count = 36,
-                                            .deviation = 37,
-                                            .nearest = {38, 39, 40},
-                                            .tick = 41,
-                                            .tick_ns = 42,
-                                            .state_age_ns = 43,
-                                            .input_digest = 44,
-                                            .compute_ns = 45,
-                                            .wake_late_ns = 46,
-                                            .previous_exec_ns = 47,
-                                            .skipped = 48}};
-    const struct lw_joint_command *c = &m.joint_command;
+    const struct lw_joint_command *c = &told.joint_command;
     unsigned char data[LW_WIRE_MAX];
     leeway_joint_command_t w;
-    const int size = (int)lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &m, data);
+    const int size = (int)lw_wire_encode(LW_CHANNEL_JOINT_COMMAND, &told, data);
     assert_int_equal(leeway_joint_command_t_decode(data, 0, size, &w), size);
     // In the order of the numbers above.
     const int64_t counts[] = {w.h.utime,
@@ -210,8 +213,8 @@ static void the_explanation_of_a_command_reaches_the_log(void **state)
                               w.world_seq,
                               w.world_version,
                               w.obstacle_count,
-                              w.distance_point,
-                              w.distance_obstacle,
+                              w.clearance_link,
+                              w.clearance_obstacle,
                               w.tick,
                               w.tick_ns,
                               w.state_age_ns,
@@ -219,16 +222,22 @@ static void the_explanation_of_a_command_reaches_the_log(void **state)
                               w.compute_ns,
                               w.wake_late_ns,
                               w.previous_exec_ns,
-                              w.skipped};
-    const int64_t expected[] = {1,  2,  3,  4,  5,  6,  7,  8,  1,  511, 2,  31, 32, 33,
-                                34, 35, 36, 39, 40, 41, 42, 43, 44, 45,  46, 47, 48};
+                              w.skipped,
+                              w.self_link[0],
+                              w.self_link[1],
+                              w.stuck_since_ns,
+                              w.world_channel};
+    const int64_t expected[] = {1,  2,  3,  4,  5,  6,  7,  8,  1,  2047, 2,  31, 32, 33, 34, 35,
+                                36, 39, 40, 41, 42, 43, 44, 45, 46, 47,   48, 50, 51, 52, 2};
     assert_same_bits(counts, expected, sizeof expected);
     assert_same_bits(w.qd, c->qd, sizeof w.qd);
     assert_same_bits(w.qd_law, c->qd_law, sizeof w.qd_law);
     assert_same_bits(w.q, c->q, sizeof w.q);
     assert_same_bits(w.goal, c->goal, sizeof w.goal);
     assert_near(w.deviation, 37, 0);
-    assert_near(w.distance, 38, 0);
+    assert_near(w.clearance, 38, 0);
+    assert_near(w.self_clearance, 49, 0);
+    assert_same_bits(w.circulation, c->circulation, sizeof w.circulation);
 }
 
 // What the plant and its lockstep take of a command.
@@ -304,24 +313,14 @@ static void every_double_is_checked(void **state)
     (void)state;
     struct random random = {86};
     union lw_message s = make(&random, LW_CHANNEL_JOINT_STATE), c = make(&random, LW_CHANNEL_JOINT_COMMAND);
-    union lw_message g = make(&random, LW_CHANNEL_GOAL), o = make(&random, LW_CHANNEL_OBSTACLES);
+    union lw_message g = make(&random, LW_CHANNEL_GOAL);
     for (int j = 0; j < LW_NJ; j++) {
         check_double(LW_CHANNEL_JOINT_STATE, &s, &s.joint_state.q[j], 1e6);
         check_double(LW_CHANNEL_JOINT_STATE, &s, &s.joint_state.qd[j], 1e6);
         check_double(LW_CHANNEL_JOINT_COMMAND, &c, &c.joint_command.qd[j], 1e6);
     }
-    o.obstacles.op = LW_UPSERT;
-    o.obstacles.count = LW_CHANGE_MAX;
-    for (int i = 0; i < LW_CHANGE_MAX; i++)
-        o.obstacles.obstacle[i] = (struct lw_obstacle){.id = i + 1};
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
         check_double(LW_CHANNEL_GOAL, &g, &g.request.goal[i], 100);
-        check_double(LW_CHANNEL_OBSTACLES, &o, &o.obstacles.obstacle[LW_CHANGE_MAX - 1].p[i], 100);
-    }
-    check_double(LW_CHANNEL_OBSTACLES, &o, &o.obstacles.obstacle[LW_CHANGE_MAX - 1].radius, 100);
-    check_double(LW_CHANNEL_WORLD, &o, &o.obstacles.obstacle[LW_CHANGE_MAX - 1].radius, 100);
-    o.obstacles.obstacle[3].radius = -5e-324;
-    check_message(LW_CHANNEL_OBSTACLES, &o, LW_E_ARGUMENT);
 }
 
 // Modes and operations out of their lists, every one of the 256 bytes; a period that is not positive.
@@ -334,13 +333,17 @@ static void every_choice_is_checked(void **state)
         int place, choices;
     } fields[] = {{LW_CHANNEL_JOINT_STATE, PLACE_OF_MODE, 4}, {LW_CHANNEL_JOINT_COMMAND, PLACE_OF_MODE + 32, 2},
                   {LW_CHANNEL_OBSTACLES, PLACE_OF_OP, 4},     {LW_CHANNEL_WORLD, PLACE_OF_OP, 4},
+                  {LW_CHANNEL_OBSTACLES, PLACE_OF_SHAPE, 5},  {LW_CHANNEL_WORLD, PLACE_OF_SHAPE, 5},
                   {LW_CHANNEL_STATUS, PLACE_OF_MODE, 5},      {LW_CHANNEL_PLANT_STATUS, PLACE_OF_MODE, 5}};
     for (size_t f = 0; f < sizeof fields / sizeof fields[0]; f++)
         for (int value = 0; value < 256; value++) {
             unsigned char data[LW_WIRE_MAX];
             union lw_message m = make(&random, fields[f].channel), out;
-            if (fields[f].channel == LW_CHANNEL_OBSTACLES || fields[f].channel == LW_CHANNEL_WORLD)
+            if (fields[f].channel == LW_CHANNEL_OBSTACLES || fields[f].channel == LW_CHANNEL_WORLD) {
                 m.obstacles.op = LW_UPSERT;
+                m.obstacles.count = 1;
+                m.obstacles.obstacle[0] = any_obstacle(&random, 1, LW_BOX); // its sizes do for all shapes
+            }
             const uint32_t size = lw_wire_encode(fields[f].channel, &m, data);
             data[fields[f].place] = (unsigned char)value;
             assert_int_equal(decode(fields[f].channel, data, size, &out),

@@ -44,7 +44,8 @@ static void constants_are_those_of_the_wire(void **state)
     assert_int_equal(LW_REFUSED_GUARD, LEEWAY_STATUS_T_GUARD);
     assert_int_equal(LW_REFUSED_IDLE, LEEWAY_STATUS_T_IDLE);
     assert_int_equal(LW_REFUSED_FULL, LEEWAY_STATUS_T_FULL);
-    assert_int_equal(LW_REFUSED_COUNT, LEEWAY_STATUS_T_FULL + 1);
+    assert_int_equal(LW_REFUSED_UNKNOWN, LEEWAY_STATUS_T_UNKNOWN);
+    assert_int_equal(LW_REFUSED_COUNT, LEEWAY_STATUS_T_UNKNOWN + 1);
     assert_true(LW_REFUSED_COUNT <= LEEWAY_STATUS_T_NREASONS);
     assert_int_equal(LW_PERCENTILES, LEEWAY_STATUS_T_NPERCENTILES);
 }
@@ -67,14 +68,18 @@ static void the_fields_keep_their_places(void **state)
                                            .taken = 14,
                                            .missed = 15,
                                            .takeovers = 16,
-                                           .refused = {21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32},
+                                           .refused = {21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33},
                                            .wake_late_ns = {41, 42, 43, 44},
                                            .exec_ns = {45, 46, 47, 48},
                                            .age_ns = {49, 50, 51, 52},
                                            .minor_faults = 17,
                                            .major_faults = 18,
                                            .allocations = 19,
-                                           .distance = -20.5}};
+                                           .clearance = -20.5,
+                                           .deviation = 20.25,
+                                           .stuck_since_ns = 53,
+                                           .obstacle_count = 54,
+                                           .world_age_ns = 55}};
     const struct lw_report *r = &m.report;
     for (int c = LW_CHANNEL_STATUS; c <= LW_CHANNEL_PLANT_STATUS; c++) {
         unsigned char data[LW_WIRE_MAX];
@@ -82,11 +87,12 @@ static void the_fields_keep_their_places(void **state)
         leeway_status_t w;
         const uint32_t size = lw_wire_encode((enum lw_channel)c, &m, data);
         assert_int_equal(leeway_status_t_decode(data, 0, (int)size, &w), size);
-        const int64_t counts[] = {w.h.utime, w.h.mono_ns,   w.h.session,    w.h.seq,        w.state,
-                                  w.faults,  w.faults_ever, w.realtime,     w.period_ns,    w.ticks,
-                                  w.skipped, w.stale_ticks, w.unsent,       w.peer_session, w.taken,
-                                  w.missed,  w.takeovers,   w.minor_faults, w.major_faults, w.allocations};
-        const int64_t expected[] = {1, 2, 3, 4, 3, 5, 7, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19};
+        const int64_t counts[] = {w.h.utime,        w.h.mono_ns,      w.h.session,    w.h.seq,        w.state,
+                                  w.faults,         w.faults_ever,    w.realtime,     w.period_ns,    w.ticks,
+                                  w.skipped,        w.stale_ticks,    w.unsent,       w.peer_session, w.taken,
+                                  w.missed,         w.takeovers,      w.minor_faults, w.major_faults, w.allocations,
+                                  w.stuck_since_ns, w.obstacle_count, w.world_age_ns};
+        const int64_t expected[] = {1, 2, 3, 4, 3, 5, 7, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 53, 54, 55};
         assert_same_bits(counts, expected, sizeof expected);
         assert_same_bits(w.refused, r->refused, sizeof r->refused);
         for (int i = LW_REFUSED_COUNT; i < LEEWAY_STATUS_T_NREASONS; i++)
@@ -94,7 +100,8 @@ static void the_fields_keep_their_places(void **state)
         assert_same_bits(w.wake_late_ns, r->wake_late_ns, sizeof w.wake_late_ns);
         assert_same_bits(w.exec_ns, r->exec_ns, sizeof w.exec_ns);
         assert_same_bits(w.age_ns, r->age_ns, sizeof w.age_ns);
-        assert_near(w.distance, -20.5, 0);
+        assert_near(w.clearance, -20.5, 0);
+        assert_near(w.deviation, 20.25, 0);
         assert_int_equal(decode((enum lw_channel)c, data, size, &out), LW_OK);
         assert_same_bits(&out.report, r, sizeof *r);
     }
@@ -109,12 +116,13 @@ static void every_count_is_checked(void **state)
     struct lw_report *r = &m.report;
     struct {
         int64_t *place, least;
-    } counts[12 + LW_REFUSED_COUNT] = {{&r->ticks, 0},        {&r->skipped, 0},      {&r->stale_ticks, 0},
-                                       {&r->unsent, 0},       {&r->peer_session, 0}, {&r->taken, 0},
-                                       {&r->missed, 0},       {&r->takeovers, 0},    {&r->minor_faults, 0},
-                                       {&r->major_faults, 0}, {&r->allocations, -1}, {&r->period_ns, 1}};
+    } counts[14 + LW_REFUSED_COUNT] = {{&r->ticks, 0},          {&r->skipped, 0},      {&r->stale_ticks, 0},
+                                       {&r->unsent, 0},         {&r->peer_session, 0}, {&r->taken, 0},
+                                       {&r->missed, 0},         {&r->takeovers, 0},    {&r->minor_faults, 0},
+                                       {&r->major_faults, 0},   {&r->allocations, -1}, {&r->period_ns, 1},
+                                       {&r->stuck_since_ns, 0}, {&r->world_age_ns, -1}};
     for (int i = 0; i < LW_REFUSED_COUNT; i++)
-        counts[12 + i].place = &r->refused[i];
+        counts[14 + i].place = &r->refused[i];
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
         const int64_t before = *counts[i].place;
         *counts[i].place = counts[i].least - 1;
@@ -130,18 +138,22 @@ static void every_count_is_checked(void **state)
     check_message(LW_CHANNEL_STATUS, &m, LW_E_ARGUMENT);
 }
 
-// A distance may be anything but no number.
-static void the_distance_is_a_number(void **state)
+// A clearance may be anything but no number, and infinite where there is no obstacle; a deviation is finite.
+static void distances_are_numbers(void **state)
 {
     (void)state;
     struct random random = {91};
-    const double no_number[] = {NO_NUMBER, -NO_NUMBER, HUGE_VAL, -HUGE_VAL};
+    const double no_number[] = {NO_NUMBER, -NO_NUMBER, -HUGE_VAL, HUGE_VAL};
     union lw_message m = make(&random, LW_CHANNEL_STATUS);
     for (int i = 0; i < 4; i++) {
-        m.report.distance = no_number[i];
+        const bool is_none = no_number[i] == HUGE_VAL;
+        m.report.clearance = no_number[i];
+        check_message(LW_CHANNEL_STATUS, &m, is_none ? LW_OK : LW_E_NOT_FINITE);
+        check_message(LW_CHANNEL_PLANT_STATUS, &m, is_none ? LW_OK : LW_E_NOT_FINITE);
+        m.report.clearance = i % 2 ? -1.7e308 : 1.7e308;
+        m.report.deviation = no_number[i];
         check_message(LW_CHANNEL_STATUS, &m, LW_E_NOT_FINITE);
-        check_message(LW_CHANNEL_PLANT_STATUS, &m, LW_E_NOT_FINITE);
-        m.report.distance = i % 2 ? -1.7e308 : 1.7e308;
+        m.report.deviation = i % 2 ? -1.7e308 : 1.7e308;
         check_message(LW_CHANNEL_STATUS, &m, LW_OK);
     }
 }
@@ -152,7 +164,7 @@ int main(void)
         cmocka_unit_test(constants_are_those_of_the_wire),
         cmocka_unit_test(the_fields_keep_their_places),
         cmocka_unit_test(every_count_is_checked),
-        cmocka_unit_test(the_distance_is_a_number),
+        cmocka_unit_test(distances_are_numbers),
     };
     return cmocka_run_group_tests_name("wire_status", tests, NULL, NULL);
 }

@@ -19,6 +19,7 @@ from leeway.connection import Connection
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 UPSERT, REMOVE, CLEAR = wire.obstacles_t.UPSERT, wire.obstacles_t.REMOVE, wire.obstacles_t.CLEAR
+SHARED = ("OBSTACLES", "HULL")  # by all robots of a bus
 RECEIVE_BUFFER = 2 << 20
 REPEAT_S = 0.1
 PATIENCE_S = 2.0
@@ -121,8 +122,8 @@ def new_session() -> int:
 
 
 def channel(name: str, robot: str | None) -> str:
-    """Return the channel of a robot; OBSTACLES is shared by all."""
-    return f"{robot}_{name}" if robot and name != "OBSTACLES" else name
+    """Return the channel of a robot; OBSTACLES and HULL are shared by all."""
+    return f"{robot}_{name}" if robot and name not in SHARED else name
 
 
 def send_until_echoed(
@@ -183,7 +184,7 @@ def send_obstacles(
     message.h = header(session, 1)
     message.op, message.n = op, len(entries)
     for slot, (number, centre, radius) in zip(message.o, entries, strict=False):
-        slot.id, slot.p, slot.radius = number, list(centre), radius
+        slot.id, slot.p, slot.quat, slot.radius = number, list(centre), [1.0, 0.0, 0.0, 0.0], radius
     return send_until_echoed(
         bus,
         "OBSTACLES",

@@ -17,15 +17,14 @@ wire = cast(Any, _generated)  # generated code carries no types: this is where t
 
 COUNTS = (
     *("ticks", "skipped", "stale_ticks", "unsent", "peer_session", "taken", "missed"),
-    *("takeovers", "minor_faults", "major_faults"),
+    *("takeovers", "minor_faults", "major_faults", "stuck_since_ns", "obstacle_count"),
 )
-NO_OBSTACLE = -1.0  # distance of a message
 STATES = ("STARTING", "WAITING", "RUNNING", "STOPPING", "ENDING")
 FAULTS = ("PEER_TIMEOUT", "OVERRUN", "BAD_INPUT", "LEASE", "UNSENT", "LOST_RECORDS")
 REALTIME = ("FIFO", "LOCKED", "AWAKE", "PINNED")
 REASONS = (
     *("SIZE", "TYPE", "NO_NUMBER", "RANGE", "DUPLICATE", "BACKWARDS", "FOREIGN"),
-    *("OTHER_PLANT", "STALE", "GUARD", "IDLE", "FULL"),
+    *("OTHER_PLANT", "STALE", "GUARD", "IDLE", "FULL", "UNKNOWN"),
 )
 
 
@@ -104,7 +103,11 @@ class Status:
     minor_faults: int
     major_faults: int
     allocations: int | None  # None: this build cannot count them
-    distance: float | None  # None: no obstacle
+    clearance: float | None  # None: no obstacle
+    deviation: float
+    stuck_since_ns: int
+    obstacle_count: int
+    world_age_ms: float | None  # None: nothing heard about obstacles
 
     def to_json(self) -> dict[str, Any]:
         """Return all fields as plain values."""
@@ -113,7 +116,6 @@ class Status:
 
 def status_of(message: Any) -> Status:
     """Put a decoded status_t into words."""
-    near = math.isfinite(message.distance) and message.distance != NO_OBSTACLE
     return Status(
         session=message.h.session,
         state=state_name(message.state),
@@ -126,6 +128,8 @@ def status_of(message: Any) -> Status:
         exec_us=Percentiles.of(message.exec_ns),
         age_us=Percentiles.of(message.age_ns),
         allocations=message.allocations if message.allocations >= 0 else None,
-        distance=message.distance if near else None,
+        clearance=message.clearance if math.isfinite(message.clearance) else None,
+        deviation=message.deviation,
+        world_age_ms=message.world_age_ns / 1e6 if message.world_age_ns >= 0 else None,
         **{name: getattr(message, name) for name in COUNTS},
     )

@@ -157,9 +157,9 @@ def _allocations(sender: Sender) -> Text:
     return Text("not counted") if count is None else _count(count)
 
 
-def _distance(sender: Sender) -> Text:
-    distance = sender.status.distance
-    return Text("-" if distance is None else f"{distance:.4f} m")
+def _clearance(sender: Sender) -> Text:
+    clearance = sender.status.clearance
+    return Text("-" if clearance is None else f"{clearance:.4f} m")
 
 
 def _messages(sender: Sender) -> Text:
@@ -192,7 +192,7 @@ ROWS: dict[str, Callable[[Sender], Text]] = {
     "  age of input": lambda s: _spread(s.status.age_us),
     "page faults": _page_faults,
     "allocations": _allocations,
-    "distance": _distance,
+    "clearance": _clearance,
 }
 
 

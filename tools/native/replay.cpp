@@ -59,10 +59,11 @@ nb::bytes acceptable(const std::string &channel, const nb::bytes &messages)
 struct World {
     lw_world data = {};
 
-    bool apply(const nb::bytes &obstacles)
+    bool apply(const nb::bytes &change, bool hull)
     {
         lw_message message;
-        return decode(LW_CHANNEL_OBSTACLES, obstacles, message) && lw_world_apply(&data, &message.obstacles) == LW_OK;
+        return decode(hull ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES, change, message) &&
+               lw_world_apply(&data, &message.obstacles) == LW_OK;
     }
 
     // What a command echoes of its world.
@@ -170,7 +171,8 @@ void bind_replay(nb::module_ &m)
         .def(nb::init<>(), "Nothing heard yet.")
         .def(
             "copy", [](const World &w) { return w; }, "The same world, to go on from.")
-        .def("apply", &World::apply, nb::arg("obstacles"), "Takes an OBSTACLES message; False when it is refused.")
+        .def("apply", &World::apply, nb::arg("change"), nb::arg("hull") = false,
+             "Takes an OBSTACLES or HULL message; False when it is refused.")
         .def("adopt", &World::adopt, nb::arg("session"), nb::arg("seq"), nb::arg("version"),
              "Takes the echo of a command for a world whose history is not known.")
         .def("obstacles", &World::obstacles, "(id, (x, y, z) m, radius m) of each, in the controller's order.")

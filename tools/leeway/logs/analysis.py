@@ -255,7 +255,7 @@ def analyse(log: Log) -> Analysis:
         plant_qdd=motion.plant_qdd,
         limits=uses,
         smallest=_smallest(motion.t, distances, obstacle),
-        distance_check=_compare(distances, commands.distance),
+        distance_check=_compare(distances, commands.clearance),
         late_ticks=0 if lockstep else int(commands.skipped[-1] - commands.skipped[0]),
         losses=motion.losses | {"worlds_unknown": line.unknown_ticks},
         post_mortem=motion.post_mortem,

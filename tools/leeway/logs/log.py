@@ -11,9 +11,9 @@ import os
 import re
 import struct
 from collections import Counter, defaultdict
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import numpy as np
 from leeway_lcm import leeway as _generated
@@ -22,164 +22,40 @@ from numpy.typing import NDArray
 from leeway import _native
 from leeway.logs.framing import LogError as LogError  # callers of this module catch it
 from leeway.logs.framing import open_events
+from leeway.logs.messages import Commands as Commands  # callers take all of them from here
+from leeway.logs.messages import Floats as Floats
+from leeway.logs.messages import Goals as Goals
+from leeway.logs.messages import Hulls as Hulls
+from leeway.logs.messages import Ints as Ints
+from leeway.logs.messages import Messages as Messages
+from leeway.logs.messages import MessagesT as MessagesT
+from leeway.logs.messages import Obstacles as Obstacles
+from leeway.logs.messages import SceneMessage as SceneMessage
+from leeway.logs.messages import States as States
+from leeway.logs.messages import Statuses as Statuses
+from leeway.logs.messages import Stops as Stops
 
 wire = cast(Any, _generated)  # generated code carries no types: this is where they end
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 _FINGERPRINT = 8  # bytes
 _ROBOT_CHANNEL = re.compile(
-    r"(?:(.+)_)?(JOINT_STATE|JOINT_COMMAND|GOAL|STOP|SCENE|WORLD|STATUS|PLANT_STATUS)"
+    r"(?:(.+)_)?"
+    r"(JOINT_STATE|JOINT_COMMAND|GOAL|STOP|SCENE|WORLD|WORLD_HULL|STATUS|PLANT_STATUS)"
 )
+SHARED = ("OBSTACLES", "HULL")  # by all robots of a bus
 _SCALARS = {"int8_t": ">i1", "int32_t": ">i4", "int64_t": ">i8", "double": ">f8"}
 _FIXED = {
     "JOINT_STATE": wire.joint_state_t,
     "JOINT_COMMAND": wire.joint_command_t,
     "OBSTACLES": wire.obstacles_t,
+    "HULL": wire.hull_t,
     "GOAL": wire.goal_t,
     "STOP": wire.stop_t,
     "WORLD": wire.obstacles_t,
+    "WORLD_HULL": wire.hull_t,
     "STATUS": wire.status_t,
     "PLANT_STATUS": wire.status_t,
 }
-
-
-@dataclass(frozen=True)
-class Messages:
-    """What every message carries, one entry a message, in the order of the log."""
-
-    order: Ints  # place in the log, from 0, counted over all channels
-    utime: Ints
-    mono_ns: Ints
-    session: Ints
-    seq: Ints
-
-    def __len__(self) -> int:
-        return len(self.order)
-
-    def take(self: MessagesT, rows: NDArray[Any]) -> MessagesT:
-        """Return the messages of a mask or of indices.
-
-        Parameters
-        ----------
-        rows : (n,) bool or (k,) int
-        """
-        return type(self)(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
-
-
-MessagesT = TypeVar("MessagesT", bound=Messages)
-
-
-@dataclass(frozen=True)
-class States(Messages):
-    """JOINT_STATE: fields of joint_state_t; q rad and qd rad/s are (n, 6)."""
-
-    plant_mode: Ints
-    command_session: Ints
-    command_seq: Ints
-    tick: Ints
-    period_ns: Ints
-    q: Floats
-    qd: Floats
-
-
-@dataclass(frozen=True)
-class Commands(Messages):
-    """JOINT_COMMAND: fields of joint_command_t; qd, qd_law, q are (n, 6), goal is (n, 3)."""
-
-    plant_session: Ints
-    state_seq: Ints
-    state_tick: Ints
-    state_mono_ns: Ints
-    mode: Ints
-    flags: Ints
-    law_outcome: Ints
-    qd: Floats
-    qd_law: Floats
-    q: Floats
-    goal: Floats
-    request_session: Ints
-    request_seq: Ints
-    world_session: Ints
-    world_seq: Ints
-    world_version: Ints
-    obstacle_count: Ints
-    deviation: Floats
-    distance: Floats
-    distance_point: Ints
-    distance_obstacle: Ints
-    tick: Ints
-    tick_ns: Ints
-    state_age_ns: Ints
-    input_digest: Ints
-    compute_ns: Ints
-    wake_late_ns: Ints
-    previous_exec_ns: Ints
-    skipped: Ints
-
-
-@dataclass(frozen=True)
-class Obstacles(Messages):
-    """OBSTACLES: n used entries of id (m, 32), p (m, 32, 3) m, radius (m, 32) m."""
-
-    op: Ints
-    n: Ints
-    id: Ints
-    p: Floats
-    radius: Floats
-
-
-@dataclass(frozen=True)
-class Goals(Messages):
-    """GOAL: p (m, 3) m."""
-
-    p: Floats
-
-
-@dataclass(frozen=True)
-class Stops(Messages):
-    """STOP."""
-
-
-@dataclass(frozen=True)
-class Statuses(Messages):
-    """STATUS, PLANT_STATUS: fields of status_t; refused is (n, 16), percentiles are (n, 4)."""
-
-    state: Ints
-    faults: Ints
-    faults_ever: Ints
-    realtime: Ints
-    period_ns: Ints
-    ticks: Ints
-    skipped: Ints
-    stale_ticks: Ints
-    unsent: Ints
-    peer_session: Ints
-    taken: Ints
-    missed: Ints
-    takeovers: Ints
-    refused: Ints
-    wake_late_ns: Ints
-    exec_ns: Ints
-    age_ns: Ints
-    minor_faults: Ints
-    major_faults: Ints
-    allocations: Ints
-    distance: Floats
-
-
-@dataclass(frozen=True)
-class SceneMessage:
-    """SCENE: what a program says that it runs."""
-
-    session: int
-    mono_ns: int
-    program: str
-    build: str
-    mode: str
-    file: str
-    yaml: str
 
 
 @dataclass(frozen=True)
@@ -225,9 +101,11 @@ class Log:
     states: States
     commands: Commands
     obstacles: Obstacles
+    hulls: Hulls
     goals: Goals
     stops: Stops
     worlds: Obstacles  # WORLD: the obstacles as the controller tells them
+    world_hulls: Hulls  # WORLD_HULL
     statuses: Statuses  # of controllers
     plant_statuses: Statuses  # of simulators
 
@@ -269,9 +147,11 @@ def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
         states=_columns(by_name["JOINT_STATE"], States),
         commands=_columns(by_name["JOINT_COMMAND"], Commands),
         obstacles=_columns(by_name["OBSTACLES"], Obstacles),
+        hulls=_columns(by_name["HULL"], Hulls),
         goals=_columns(by_name["GOAL"], Goals),
         stops=_columns(by_name["STOP"], Stops),
         worlds=_columns(by_name["WORLD"], Obstacles),
+        world_hulls=_columns(by_name["WORLD_HULL"], Hulls),
         statuses=_columns(by_name["STATUS"], Statuses),
         plant_statuses=_columns(by_name["PLANT_STATUS"], Statuses),
     )
@@ -303,7 +183,7 @@ def _scan(path: Path) -> _Raw:
     with open_events(path) as events:
         for number, (_, _, channel, data) in enumerate(events):
             raw.counts[channel] += 1
-            if channel == "OBSTACLES" or _ROBOT_CHANNEL.fullmatch(channel):
+            if channel in SHARED or _ROBOT_CHANNEL.fullmatch(channel):
                 raw.order[channel].append(number)
                 raw.data[channel].append(data)
         raw.left = events.left
@@ -342,7 +222,7 @@ def _fits(name: str, data: bytes) -> bool:
 
 
 def _channel(robot: str, name: str) -> str:
-    return f"{robot}_{name}" if robot and name != "OBSTACLES" else name
+    return f"{robot}_{name}" if robot and name not in SHARED else name
 
 
 def _choose_robot(path: Path, raw: _Raw, name: str | None) -> str:

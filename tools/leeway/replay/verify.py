@@ -24,9 +24,9 @@ ECHOED = {
         "world_seq",
         "world_version",
         "obstacle_count",
-        "distance",
-        "distance_point",
-        "distance_obstacle",
+        "clearance",
+        "clearance_link",
+        "clearance_obstacle",
     },
 }
 

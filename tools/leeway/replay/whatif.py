@@ -26,6 +26,8 @@ FLAGS = {
     "waiting": 64,
     "foreign": 128,
     "warming_up": 256,
+    "clearance": 512,
+    "contact": 1024,
 }
 # What the tick takes from the scene; everything else acts on the plant or comes over the bus.
 USED_BY_TICK = ("robot", "rate_hz", "law", "limits", "request")
