@@ -253,7 +253,7 @@ def test_damage_is_found_where_it_was_done(root: Path, tmp_path: Path) -> None:
     heard = [o for o in read(log, "OBSTACLES") if o.n == 1 and o.o[0].id == 77]
     place = damage.place("OBSTACLES", heard[0].h.session, heard[0].h.seq)
     first = next(c.tick for c in moving if c.world_session == heard[0].h.session)
-    c = damage.flip(place, 8 + 32 + 5 + 4 + 5)
+    c = damage.flip(place, 8 + 32 + 25 + 5 + 5)
     assert c["first"]["tick"] == first
     assert "OBSTACLES id 77: p[0]" in changed(c)
 
