@@ -90,16 +90,16 @@ static void reachable_bounds(const struct lw_limits *limits, double period_s, co
     }
 }
 
-unsigned lw_guard_shape(const struct lw_limits *limits, double period_s, const double q[LW_NJ],
-                        const double velocity[LW_NJ], const double wish[LW_NJ], double command[LW_NJ])
+unsigned lw_guard_shape(const struct lw_guard_input *in, double command[LW_NJ])
 {
+    const struct lw_limits *limits = in->limits;
     unsigned flags = 0;
     double target[LW_NJ] = {0}, low[LW_NJ], high[LW_NJ];
 
     // Finite first: a NaN that reaches a min or max becomes full speed.
-    const bool q_finite = lw_all_finite(q, LW_NJ);
-    if (q_finite && lw_all_finite(wish, LW_NJ))
-        memcpy(target, wish, sizeof target);
+    const bool q_finite = lw_all_finite(in->q, LW_NJ);
+    if (q_finite && lw_all_finite(in->wish, LW_NJ))
+        memcpy(target, in->wish, sizeof target);
     else
         flags |= LW_NOT_FINITE;
 
@@ -109,16 +109,16 @@ unsigned lw_guard_shape(const struct lw_limits *limits, double period_s, const d
         high[j] = HUGE_VAL;
     }
     if (q_finite)
-        position_bounds(limits, period_s, q, low, high);
+        position_bounds(limits, in->period_s, in->q, low, high);
     if (clamp_each(low, high, target))
         flags |= LW_LIMIT_POSITION;
     if (limit_velocity(limits, target))
         flags |= LW_LIMIT_VELOCITY;
 
     // Acceleration; where the common scale brakes a joint too little for its range, that joint goes first.
-    if (limit_acceleration(limits, period_s, velocity, target))
+    if (limit_acceleration(limits, in->period_s, in->velocity, target))
         flags |= LW_LIMIT_ACCELERATION;
-    reachable_bounds(limits, period_s, velocity, low, high);
+    reachable_bounds(limits, in->period_s, in->velocity, low, high);
     if (clamp_each(low, high, target))
         flags |= LW_LIMIT_POSITION;
     memcpy(command, target, sizeof target);

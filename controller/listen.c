@@ -51,8 +51,7 @@ static void on_obstacles(void *user, enum lw_channel channel, const union lw_mes
         return;
     lw_heard_note(&live->heard, channel, message);
     atomic_store(&live->world_heard_ns, lw_clock_mono_ns());
-    struct lw_world *slot = lw_mailbox_slot(&live->world_box);
-    *slot = live->world;
+    lw_world_build(&live->world, lw_mailbox_slot(&live->world_box));
     lw_mailbox_publish(&live->world_box);
 }
 

@@ -31,10 +31,10 @@ struct lw_live {
     struct lw_control *control;
     struct lw_bus *rt_bus, *rx_bus, *world_rx_bus, *world_bus, *status_bus;
     struct lw_mailbox state_box;   // rx -> rt: struct lw_arrival
-    struct lw_mailbox world_box;   // world -> rt: struct lw_world
+    struct lw_mailbox world_box;   // world -> rt: struct lw_snapshot
     struct lw_mailbox request_box; // world -> rt: struct lw_request
     _Alignas(LW_CACHE_LINE) struct lw_arrival state_slots[LW_MAILBOX_SLOTS];
-    _Alignas(LW_CACHE_LINE) struct lw_world world_slots[LW_MAILBOX_SLOTS];
+    _Alignas(LW_CACHE_LINE) struct lw_snapshot world_slots[LW_MAILBOX_SLOTS];
     _Alignas(LW_CACHE_LINE) struct lw_request request_slots[LW_MAILBOX_SLOTS];
     struct lw_health health;            // rt -> main
     struct lw_heard heard;              // world -> main

@@ -9,8 +9,9 @@
 // Errors   see control.h.
 #include "controller/control.h"
 
-#include "base/clock.h" // lw_clock_mono_ns
-#include "base/stop.h"  // lw_stop_signal
+#include "base/clock.h"      // lw_clock_mono_ns
+#include "collision/world.h" // lw_world_apply
+#include "base/stop.h"       // lw_stop_signal
 
 enum { POLL_MS = 100 };
 static const int64_t quiet_ns = 300 * 1000 * 1000; // without a state for this long, no plant waits for us
@@ -19,6 +20,7 @@ struct lockstep {
     struct lw_control *control;
     struct lw_bus *bus;
     struct lw_world world;
+    struct lw_snapshot seen; // the world as the tick sees it
     struct lw_request request;
     struct lw_request_memory requests; // those put into `request`
     union lw_message command;          // last one sent
@@ -29,7 +31,7 @@ struct lockstep {
 static void tick(struct lockstep *l, const struct lw_joint_state *joint)
 {
     const struct lw_tick_input in = {
-        .time_ns = joint->tick * joint->period_ns, .joint = joint, .world = &l->world, .request = &l->request};
+        .time_ns = joint->tick * joint->period_ns, .joint = joint, .world = &l->seen, .request = &l->request};
     lw_tick(&l->control->config, &l->control->state, &in, &l->command.joint_command);
     l->plant_session = joint->stamp.session;
     l->plant_tick = joint->tick;
@@ -48,14 +50,19 @@ static void on_joint_state(struct lockstep *l, const struct lw_joint_state *join
         lw_program_say(l->control->program, "a command could not be sent; the plant asks again");
 }
 
+static void on_obstacles(struct lockstep *l, const struct lw_obstacle_change *change)
+{
+    if (lw_refusals_note(&l->control->program->refusals, lw_verdict_of(lw_world_apply(&l->world, change))))
+        lw_world_build(&l->world, &l->seen);
+}
+
 static void on_message(void *user, enum lw_channel channel, const union lw_message *message)
 {
     struct lockstep *l = user;
     if (channel == LW_CHANNEL_JOINT_STATE)
         on_joint_state(l, &message->joint_state);
     else if (channel == LW_CHANNEL_OBSTACLES || channel == LW_CHANNEL_HULL)
-        (void)lw_refusals_note(&l->control->program->refusals,
-                               lw_verdict_of(lw_world_apply(&l->world, &message->obstacles)));
+        on_obstacles(l, &message->obstacles);
     else if (lw_request_is_new(&l->requests, &message->request)) // a repetition must not replace one not ticked yet
         l->request = message->request;
 }

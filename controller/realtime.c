@@ -29,7 +29,7 @@ static const struct lw_arrival *compute(struct loop *loop)
     struct lw_record *record = &loop->record;
     bool other = false;
     const struct lw_arrival *arrival = lw_mailbox_take(&live->state_box, &record->fresh);
-    const struct lw_world *world = lw_mailbox_take(&live->world_box, &other);
+    const struct lw_snapshot *world = lw_mailbox_take(&live->world_box, &other);
     const struct lw_request *request = lw_mailbox_take(&live->request_box, &other);
     record->time_ns = loop->periodic.wake_ns;
     record->warm = record->time_ns - loop->start_ns > warm_up_ns;

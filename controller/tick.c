@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The whole pipeline on one page: estimate -> select request -> law -> guard -> explain.
+// The whole pipeline on one page: estimate -> select request -> look around -> law -> guard -> explain.
 //
 // Units    metres, radians, seconds; ns where a name says so.
 // Frames   base frame of the arm.
@@ -8,12 +8,12 @@
 // Errors   see tick.h.
 #include "controller/tick.h"
 
-#include "base/clock.h"       // LW_NS_PER_S
-#include "base/digest.h"      // lw_digest_*
-#include "base/vec.h"         // lw_vec_*, lw_all_finite
-#include "controller/guard.h" // lw_guard_shape
+#include "base/clock.h"           // LW_NS_PER_S
+#include "base/vec.h"             // lw_vec_*, lw_all_finite
+#include "controller/clearance.h" // lw_clearance_command
+#include "controller/explain.h"   // lw_explain_*
 
-#include <math.h>   // NAN, INFINITY
+#include <math.h>   // fmax, isfinite
 #include <string.h> // memcpy
 
 static const int64_t stale_after_ns = 20 * 1000 * 1000;
@@ -35,9 +35,17 @@ enum lw_status lw_controller_init(struct lw_controller *config, struct lw_contro
                                      .period_ns = period_ns,
                                      .stale_after_ns = patience_ns > stale_after_ns ? patience_ns : stale_after_ns};
     memcpy(config->goal, scene->goal, sizeof config->goal);
+    lw_body_make((enum lw_robot)scene->robot, (enum lw_body_model)scene->law.control_points, &scene->tool,
+                 &config->body);
     *state = (struct lw_controller_state){.request = {.kind = LW_REQUEST_GOAL}};
     memcpy(state->request.goal, scene->goal, sizeof state->request.goal);
+    lw_escape_reset(&state->escape, &config->params.remedy);
     return LW_OK;
+}
+
+static double period_s(const struct lw_controller *config)
+{
+    return (double)config->period_ns / (double)LW_NS_PER_S;
 }
 
 // --- estimate ---
@@ -68,7 +76,8 @@ static void estimate(const struct lw_controller *config, struct lw_controller_st
 // --- select request ---
 
 // Adopts a new request. A stop has no goal of its own: the arm still knows where it was going.
-static void select_request(struct lw_controller_state *state, const struct lw_request *request)
+static void select_request(const struct lw_controller *config, struct lw_controller_state *state,
+                           const struct lw_request *request)
 {
     if (!lw_request_is_new(&state->requests, request))
         return;
@@ -76,6 +85,42 @@ static void select_request(struct lw_controller_state *state, const struct lw_re
     state->request = *request;
     if (request->kind == LW_REQUEST_STOP)
         memcpy(state->request.goal, before.goal, sizeof before.goal);
+    lw_escape_reset(&state->escape, &config->params.remedy);
+}
+
+// --- look around ---
+
+// Finds all that the law or the guard may have to know of. False when the configuration is no number.
+static bool look(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
+                 struct lw_surroundings *around)
+{
+    const double speed = in->world->speed_max;
+    const struct lw_law_reach reach = config->law->reach(&config->params, speed);
+    const double brake = lw_clearance_reach(&config->limits, period_s(config), state->velocity, speed);
+    const struct lw_eyes eyes = {.arm = config->arm,
+                                 .body = &config->body,
+                                 .world = in->world,
+                                 .time_ns = in->time_ns,
+                                 .reach = fmax(reach.obstacles, brake),
+                                 .self_reach = fmax(reach.self, brake),
+                                 .warm = &state->warm};
+    if (state->tick % LW_WARM_TICKS == 0)
+        memset(&state->warm, 0, sizeof state->warm);
+    return lw_surroundings_look(&eyes, in->joint->q, around) == LW_OK;
+}
+
+// Whether the axis of a link is inside an obstacle, or the distances are not known: nothing to steer by.
+static bool is_contact(const struct lw_controller *config, const struct lw_surroundings *around)
+{
+    if (isinf(config->limits.clearance))
+        return false;
+    bool contact = around->near.needed > around->near.count;
+    for (int i = 0; i < around->near.count; i++) {
+        const struct lw_near *pair = &around->near.pair[i];
+        contact |= !isfinite(pair->distance.d);
+        contact |= pair->obstacle != 0 && (pair->distance.flags & LW_DISTANCE_CORE);
+    }
+    return contact;
 }
 
 // --- law ---
@@ -98,95 +143,85 @@ static unsigned brake_reasons(const struct lw_controller *config, const struct l
     return flags;
 }
 
-// Asks the law at the measured configuration. A configuration that is no number gives no wish either.
-static enum lw_law_outcome ask_law(const struct lw_controller *config, const struct lw_controller_state *state,
-                                   const struct lw_tick_input *in, struct lw_pose frame[LW_NJ],
-                                   struct lw_law_output *law)
+static void ask_law(const struct lw_controller *config, const struct lw_controller_state *state,
+                    const struct lw_surroundings *around, struct lw_joint_command *out)
 {
-    if (lw_arm_fk(config->arm, in->joint->q, frame) == LW_OK) {
-        const struct lw_law_input law_in = {.frame = frame, .world = in->world, .goal = state->request.goal};
-        config->law->step(&config->params, &law_in, law);
-        return lw_all_finite(law->qd, LW_NJ) ? LW_LAW_OK : LW_LAW_NO_NUMBER;
-    }
-    // Nothing is known then, neither the wish nor where the frames are.
-    const double nan = (double)NAN;
-    *law = (struct lw_law_output){.qd = {nan, nan, nan, nan, nan, nan}, .nearest = {.clearance = (double)INFINITY}};
-    for (int i = 0; i < LW_NJ; i++)
-        frame[i] = (struct lw_pose){.p = {nan, nan, nan}};
-    return LW_LAW_NOT_ASKED;
-}
-
-// --- explain ---
-
-// Digest of all that the tick was given, so that a replay can tell that it was given the same.
-// tools/leeway/replay/digest.py names these values in this order.
-static int64_t digest_input(const struct lw_controller *config, const struct lw_controller_state *state,
-                            const struct lw_tick_input *in)
-{
-    const struct lw_joint_state *joint = in->joint;
-    const struct lw_request *request = &state->request;
-    const int64_t words[] = {
-        joint->stamp.utime,   joint->stamp.mono_ns,    joint->stamp.session,   joint->stamp.seq,
-        (int64_t)joint->mode, joint->command_session,  joint->command_seq,     joint->tick,
-        joint->period_ns,     in->world->last.session, in->world->last.seq,    in->world->version,
-        in->world->digest,    request->stamp.session,  request->stamp.seq,     (int64_t)request->kind,
-        in->time_ns,          in->state_age_ns,        (int64_t)in->warming_up};
-    uint64_t digest = lw_digest_int(LW_DIGEST_START, config->scene_digest);
-    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
-        digest = lw_digest_int(digest, words[i]);
-    digest = lw_digest_doubles(digest, joint->q, LW_NJ);
-    digest = lw_digest_doubles(digest, joint->qd, LW_NJ);
-    return (int64_t)lw_digest_doubles(digest, request->goal, 3);
-}
-
-static void explain(const struct lw_controller_state *state, const struct lw_tick_input *in, const double tip[3],
-                    const struct lw_law_output *law, struct lw_joint_command *out)
-{
+    const struct lw_law_input in = {
+        .around = around, .body = &config->body, .goal = state->request.goal, .circulation = state->escape.circulation};
+    config->law->step(&config->params, &in, out->qd_law);
+    out->law_outcome = lw_all_finite(out->qd_law, LW_NJ) ? LW_LAW_OK : LW_LAW_NO_NUMBER;
+    memcpy(out->circulation, state->escape.circulation, sizeof out->circulation);
     double to_goal[3];
-    lw_vec_sub(state->request.goal, tip, to_goal);
-    out->plant_session = in->joint->stamp.session;
-    out->state_seq = in->joint->stamp.seq;
-    out->state_tick = in->joint->tick;
-    out->state_mono_ns = in->joint->stamp.mono_ns;
-    memcpy(out->qd_law, law->qd, sizeof out->qd_law);
-    memcpy(out->q, in->joint->q, sizeof out->q);
-    memcpy(out->goal, state->request.goal, sizeof out->goal);
-    out->request = state->request.stamp;
-    out->world = in->world->last;
-    out->world_channel = in->world->last_channel;
-    out->world_version = in->world->version;
-    out->obstacle_count = in->world->count;
+    lw_vec_sub(state->request.goal, around->frame[LW_NJ - 1].p, to_goal);
     out->deviation = lw_vec_norm(to_goal);
-    out->nearest = law->nearest;
-    out->self_clearance = (double)INFINITY;
-    out->tick = state->tick;
-    out->tick_ns = in->time_ns;
-    out->state_age_ns = in->state_age_ns;
 }
+
+// Watches for standstill away from the goal; a braked arm stands for another reason.
+static void escape(const struct lw_controller *config, struct lw_controller_state *state,
+                   const struct lw_tick_input *in, const struct lw_surroundings *around, struct lw_joint_command *out)
+{
+    const struct lw_escape_model model = {.law = config->law,
+                                          .params = &config->params,
+                                          .limits = &config->limits,
+                                          .arm = config->arm,
+                                          .body = &config->body};
+    const struct lw_escape_now now = {.world = in->world,
+                                      .q = in->joint->q,
+                                      .velocity = state->velocity,
+                                      .tip = around->frame[LW_NJ - 1].p,
+                                      .goal = state->request.goal,
+                                      .deviation = out->deviation,
+                                      .time_ns = in->time_ns,
+                                      .period_ns = config->period_ns};
+    if (lw_escape_step(&state->escape, &model, &now))
+        out->law_outcome = LW_LAW_STUCK;
+    out->stuck_since_ns = state->escape.stuck.since_ns;
+}
+
+// --- guard ---
+
+// The last word; a reason to brake replaces the law's wish by rest.
+static void guard(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
+                  const struct lw_surroundings *around, struct lw_joint_command *out)
+{
+    static const double rest[LW_NJ] = {0};
+    struct lw_rooms rooms = {.count = 0};
+    const struct lw_guard_input guard_in = {.limits = &config->limits,
+                                            .period_s = period_s(config),
+                                            .q = in->joint->q,
+                                            .velocity = state->velocity,
+                                            .wish = out->flags ? rest : out->qd_law};
+    if (around != NULL)
+        lw_clearance_rooms(&config->limits, &config->body, around, &rooms);
+    out->flags |= lw_clearance_command(&guard_in, &rooms, out->qd);
+    out->mode = (out->flags & (LW_WAITING | LW_WARMING_UP)) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
+    memcpy(state->velocity, out->qd, sizeof state->velocity);
+}
+
+// --- the tick ---
 
 void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
              struct lw_joint_command *out)
 {
-    static const double rest[LW_NJ] = {0};
-    struct lw_pose frame[LW_NJ];
-    struct lw_law_output law;
-    *out = (struct lw_joint_command){0};
+    struct lw_surroundings around;
+    *out = lw_explain_nothing();
     state->tick++;
 
     estimate(config, state, in);
-    select_request(state, in->request);
-    out->law_outcome = ask_law(config, state, in, frame, &law);
-
-    // The guard has the last word; a reason to brake replaces the law's wish by rest.
+    select_request(config, state, in->request);
     out->flags = brake_reasons(config, state, in);
-    const double *wish = out->flags ? rest : law.qd;
-    const double period_s = (double)config->period_ns / (double)LW_NS_PER_S;
-    out->flags |= lw_guard_shape(&config->limits, period_s, in->joint->q, state->velocity, wish, out->qd);
-    out->mode = (out->flags & (LW_WAITING | LW_WARMING_UP)) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
-    memcpy(state->velocity, out->qd, sizeof state->velocity);
-
-    explain(state, in, frame[LW_NJ - 1].p, &law, out);
-    out->input_digest = digest_input(config, state, in);
+    const bool seen = look(config, state, in, &around);
+    if (seen) {
+        out->flags |= is_contact(config, &around) ? LW_CONTACT : 0u;
+        ask_law(config, state, &around, out);
+        lw_explain_clearance(config, state, in, &around, out);
+    }
+    if (seen && out->flags == 0)
+        escape(config, state, in, &around, out);
+    else
+        lw_escape_pause(&state->escape);
+    guard(config, state, in, seen ? &around : NULL, out);
+    lw_explain_inputs(config, state, in, out);
 }
 
 bool lw_controller_at_rest(const struct lw_controller_state *state)

@@ -5,7 +5,7 @@
 // Units    metres, radians, seconds.
 // Frames   base frame of the arm.
 // Arrays   row k belongs to controller period k; rows = lw_scene_steps(scene) + 1.
-// Memory   the caller owns the result's arrays; nothing is allocated.
+// Memory   the caller owns the result's arrays; the run's own memory is freed.
 // Errors   enum lw_status.
 #ifndef LW_SIMULATOR_BATCH_H
 #define LW_SIMULATOR_BATCH_H
@@ -18,11 +18,13 @@ struct lw_batch_result {
     double *qd;        // [rows][6] rad/s, commanded at q
     double *tip;       // [rows][3] m
     double *deviation; // [rows] m, tip to goal
-    double *distance;  // [rows] m, smallest control point to obstacle surface; infinite without obstacles
-    int *flags;        // [rows] set of enum lw_flag
+    double *clearance;      // [rows] m, smallest, arm to obstacles; infinite without obstacles
+    double *self_clearance; // [rows] m, smallest, of links watched against each other; infinite where none is near
+    int *flags;             // [rows] set of enum lw_flag
+    int *outcome;           // [rows] enum lw_law_outcome
 };
 
-// Runs a scene. Cost: about a microsecond a row with few obstacles.
+// Runs a scene. Fails LW_E_FULL when there is no memory. Cost: about a microsecond a row with few obstacles.
 LW_MUST_CHECK enum lw_status lw_batch_run(const struct lw_scene *scene, const struct lw_batch_result *result);
 
 #endif

@@ -9,18 +9,10 @@
 #include "collision/world.h"
 
 #include "base/digest.h" // lw_digest_*
-#include "base/vec.h"    // lw_vec_*
 
 #include <stdbool.h> // bool
-
-double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3], double away[3])
-{
-    lw_vec_sub(x, obstacle->p, away);
-    const double n = lw_vec_norm(away);
-    for (int i = 0; i < 3; i++)
-        away[i] = n > 0 ? away[i] / n : 0.0;
-    return n - obstacle->radius;
-}
+#include <stddef.h>  // NULL
+#include <string.h>  // memcpy
 
 static int find(const struct lw_world *world, int id)
 {
@@ -82,7 +74,7 @@ static bool put(struct lw_world *world, struct lw_obstacle obstacle, int64_t ses
     int at = find(world, obstacle.id);
     if (at >= 0 && world->owner[at] == session && same(&world->obstacle[at], &obstacle))
         return false;
-    if (at < 0 && world->count == LW_WORLD_MAX) {
+    if (at < 0 && world->count == LW_REGISTRY_MAX) {
         *full = true;
         return false;
     }
@@ -159,4 +151,24 @@ enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_c
     next.digest = digest(&next);
     *world = next;
     return LW_OK;
+}
+
+void lw_world_build(const struct lw_world *world, struct lw_snapshot *snapshot)
+{
+    lw_snapshot_begin(snapshot);
+    for (int i = 0; i < world->count; i++) {
+        const struct lw_obstacle *o = &world->obstacle[i];
+        const struct lw_solid solid = lw_obstacle_solid(o, NULL, 0);
+        struct lw_pose pose;
+        struct lw_motion motion = {0};
+        memcpy(motion.v, o->v, sizeof motion.v);
+        memcpy(motion.omega, o->omega, sizeof motion.omega);
+        if (lw_pose_make(o->p, o->quat, &pose) == LW_OK)
+            (void)(lw_snapshot_add(snapshot, o->id, 1, &solid, &pose, &motion) == LW_OK);
+    }
+    lw_snapshot_end(snapshot);
+    snapshot->version = world->version;
+    snapshot->last = world->last;
+    snapshot->last_channel = world->last_channel;
+    snapshot->digest = world->digest;
 }

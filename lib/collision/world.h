@@ -11,8 +11,9 @@
 
 #include "base/status.h"        // enum lw_status
 #include "collision/obstacle.h" // struct lw_obstacle, struct lw_obstacle_change
+#include "collision/snapshot.h" // struct lw_snapshot
 
-enum { LW_WORLD_MAX = 256, LW_SENDERS_MAX = 32 };
+enum { LW_REGISTRY_MAX = 256, LW_SENDERS_MAX = 32 };
 
 // Newest message of a sender.
 struct lw_sender {
@@ -26,22 +27,21 @@ struct lw_world {
     int last_channel;     // enum lw_world_channel of that message
     int64_t digest;       // of the obstacles, in their order
     int count;
-    struct lw_obstacle obstacle[LW_WORLD_MAX];
-    int64_t owner[LW_WORLD_MAX];             // session that sent the obstacle last
+    struct lw_obstacle obstacle[LW_REGISTRY_MAX];
+    int64_t owner[LW_REGISTRY_MAX];          // session that sent the obstacle last
     struct lw_sender sender[LW_SENDERS_MAX]; // senders heard last; the oldest makes room
     int next_sender;
 };
 
-// Signed distance from point x to an obstacle's surface, and the direction of growing distance.
-//   away  out  [3] unit vector from the obstacle's centre to x; zero when x is the centre
-double lw_obstacle_distance(const struct lw_obstacle *obstacle, const double x[3], double away[3]);
-
 // Applies a change. The version grows only when the set really differs; a repeated message changes nothing.
 // An id belongs to the source that sent it last; REMOVE and CLEAR reach obstacles of every source. A message that comes
 // again is noted as the newest one heard, because its sender waits for that, and changes nothing.
-// Fails LW_E_OLD when its source has sent a newer message already, LW_E_FULL when the result would exceed LW_WORLD_MAX,
-// LW_E_UNKNOWN for a hull that is named without vertices and not there; the world is unchanged then. Cost: O(changes *
-// count).
+// Fails LW_E_OLD when its source has sent a newer message already, LW_E_FULL when the result would exceed
+// LW_REGISTRY_MAX, LW_E_UNKNOWN for a hull that is named without vertices and not there; the world is unchanged then.
+// Cost: O(changes * count).
 LW_MUST_CHECK enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change);
+
+// The world as the tick sees it. Cost: n log n.
+void lw_world_build(const struct lw_world *world, struct lw_snapshot *snapshot);
 
 #endif

@@ -11,6 +11,7 @@
 
 #include "arm/arm.h"            // LW_NJ, enum lw_robot
 #include "base/schema.h"        // struct lw_error, struct lw_key
+#include "collision/body.h"     // enum lw_body_model, struct lw_tool
 #include "collision/obstacle.h" // LW_CHANGE_MAX, struct lw_obstacle_change
 
 #include <stdint.h> // int64_t
@@ -21,6 +22,7 @@ struct lw_limits {
     double position_max[LW_NJ]; // rad
     double velocity[LW_NJ];     // rad/s
     double acceleration[LW_NJ]; // rad/s^2
+    double clearance;           // m, to keep from obstacles and between links
 };
 
 // The kinematic plant.
@@ -32,12 +34,11 @@ struct lw_plant_config {
 };
 
 enum lw_law_name { LW_LAW_APF };
-enum lw_control_points { LW_POINTS_JOINTS };
 enum lw_attraction { LW_ATTRACTION_CONE, LW_ATTRACTION_CONE_PAR };
+enum lw_remedy { LW_REMEDY_NONE, LW_REMEDY_VORTEX, LW_REMEDY_ROLLOUT };
 
 // Potential field (Tezak & Truntic 2020, equations 1 to 6).
 struct lw_apf_params {
-    int control_points;  // enum lw_control_points
     int attraction;      // enum lw_attraction
     int gamma;           // exponent of the repulsive potential, 1 or 2
     double k_a;          // rad/s per m of lever arm, gain of the attraction
@@ -45,11 +46,23 @@ struct lw_apf_params {
     double eta;          // gain of the repulsion
     double rho_rep;      // m, reach of the repulsion
     double distance_min; // m, smaller distances count as this: bounds the force
+    double approach_s;   // s, an obstacle that comes is taken to be nearer by its way in this time
+    double eta_self;     // gain of the repulsion between links
+    double rho_self;     // m, its reach
+};
+
+// What to do about standing still away from the goal.
+struct lw_remedy_params {
+    int kind;           // enum lw_remedy
+    double axis[3];     // of the vortex; not normalised
+    double circulation; // strength of the circulation, as a part of the repulsion
 };
 
 struct lw_law_params {
-    int name; // enum lw_law_name
+    int name;           // enum lw_law_name
+    int control_points; // enum lw_body_model
     struct lw_apf_params apf;
+    struct lw_remedy_params remedy;
 };
 
 struct lw_scene_obstacle {
@@ -66,7 +79,8 @@ struct lw_scene {
     struct lw_limits limits;
     struct lw_plant_config plant;
     struct lw_law_params law;
-    double goal[3]; // m
+    double goal[3];      // m
+    struct lw_tool tool; // on the flange
     int obstacle_count;
     struct lw_scene_obstacle obstacle[LW_CHANGE_MAX];
 };

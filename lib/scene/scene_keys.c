@@ -15,8 +15,9 @@
 
 static const char *const robot_names[] = {"ur5", "ur10", NULL};
 static const char *const law_names[] = {"apf", NULL};
-static const char *const control_point_names[] = {"joints", NULL};
+static const char *const control_point_names[] = {"joints", "capsules", "capsules_fine", NULL};
 static const char *const attraction_names[] = {"cone", "cone_par", NULL};
+static const char *const remedy_names[] = {"none", "vortex", "rollout", NULL};
 
 // Field of the scene, and the ranges that come again.
 #define AT(field) .offset = offsetof(struct lw_scene, field)
@@ -36,6 +37,8 @@ static const struct lw_key limit_keys[] = {
     {.name = "velocity", LIMITS("rad/s"), AT(limits.velocity), .help = "joint speed limit of the guard"},
     {.name = "acceleration", LIMITS("rad/s^2"), AT(limits.acceleration),
      .help = "joint acceleration limit of the guard"},
+    {.name = "clearance", .kind = LW_LIMITS, .count = 1, AT(limits.clearance), .min = 0, .max = 10, .unit = "m",
+     .help = "distance that the guard keeps from obstacles and between links, as far as the arm can brake for it"},
     {.name = NULL}};
 
 static const struct lw_key plant_keys[] = {
@@ -50,8 +53,9 @@ static const struct lw_key plant_keys[] = {
 
 static const struct lw_key law_keys[] = {
     {.name = "name", CHOICE(law_names), AT(law.name), .help = "law that moves the arm"},
-    {.name = "control_points", CHOICE(control_point_names), AT(law.apf.control_points),
-     .help = "points that obstacles repel: joints = origins of the DH frames 1 to 6"},
+    {.name = "control_points", CHOICE(control_point_names), AT(law.control_points),
+     .help = "what obstacles repel: joints = origins of the DH frames 2 to 6; capsules = the whole arm, 6 of them; "
+             "capsules_fine = 10 closer ones"},
     {.name = "attraction", CHOICE(attraction_names), AT(law.apf.attraction),
      .help = "cone: constant pull; cone_par: proportional within r0 of the goal"},
     {.name = "gamma", .kind = LW_INTEGER, .min = 1, .max = 2, AT(law.apf.gamma),
@@ -65,6 +69,19 @@ static const struct lw_key law_keys[] = {
      .help = "reach of the repulsion from an obstacle's surface"},
     {.name = "distance_min", .kind = LW_NUMBER, AT(law.apf.distance_min), POSITIVE, .unit = "m",
      .help = "smaller distances count as this, which bounds the force"},
+    {.name = "approach_s", .kind = LW_NUMBER, AT(law.apf.approach_s), .min = 0, .max = 10, .unit = "s",
+     .help = "an obstacle that comes counts as nearer by its way in this time; 0 = only where it is now"},
+    {.name = "eta_self", .kind = LW_NUMBER, AT(law.apf.eta_self), .min = 0, .max = HUGE_VAL,
+     .help = "gain of the repulsion between links, 0 = none"},
+    {.name = "rho_self", .kind = LW_NUMBER, AT(law.apf.rho_self), POSITIVE, .unit = "m",
+     .help = "reach of the repulsion between links"},
+    {.name = "remedy", CHOICE(remedy_names), AT(law.remedy.kind),
+     .help = "against standing still away from the goal: vortex = always circulate about axis; rollout = when stuck try "
+             "circulations ahead and keep the best"},
+    {.name = "axis", .kind = LW_VECTOR, .count = 3, AT(law.remedy.axis), .min = -10, .max = 10,
+     .help = "axis of the vortex, used as it is"},
+    {.name = "circulation", .kind = LW_NUMBER, AT(law.remedy.circulation), .min = 0, .max = 10,
+     .help = "strength of the circulation as a part of the repulsion"},
     {.name = NULL}};
 
 static const struct lw_key request_keys[] = {
@@ -116,14 +133,19 @@ struct lw_scene lw_scene_defaults(enum lw_robot robot)
         .duration_s = 8,
         .plant = {.timeout_s = 0.02},
         .law = {.name = LW_LAW_APF,
-                .apf = {.control_points = LW_POINTS_JOINTS,
-                        .attraction = LW_ATTRACTION_CONE_PAR,
+                .control_points = LW_BODY_CAPSULES,
+                .apf = {.attraction = LW_ATTRACTION_CONE_PAR,
                         .gamma = 2,
                         .k_a = 1,
                         .r0 = 0.05,
                         .eta = 0.01,
                         .rho_rep = 0.25,
-                        .distance_min = 0.005}},
+                        .distance_min = 0.005,
+                        .approach_s = 0.2,
+                        .eta_self = 2e-5,
+                        .rho_self = 0.05},
+                .remedy = {.kind = LW_REMEDY_NONE, .axis = {0, 0, -1}, .circulation = 1}},
+        .limits = {.clearance = 0.01},
     };
     const struct lw_arm *arm = lw_arm_get(robot);
     for (int j = 0; j < LW_NJ; j++) {

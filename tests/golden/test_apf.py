@@ -50,8 +50,8 @@ def test_smallest_distance_of_each_point(root, golden, attraction, gamma):
         np.testing.assert_allclose(
             distance, data["cases"][case]["min_dist_each_point"], rtol=0, atol=1e-9
         )
-        assert run.distance.min() == pytest.approx(distance[1:].min(), abs=1e-15)
-        assert run.distance.min() >= 1.58
+        assert run.clearance.min() == pytest.approx(distance[1:].min(), abs=1e-15)
+        assert run.clearance.min() >= 1.58
 
 
 @pytest.mark.parametrize(("attraction", "gamma"), VARIANTS)

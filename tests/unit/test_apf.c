@@ -35,6 +35,12 @@ static double repulsion_potential(const struct lw_apf_params *p, double d)
     return d <= p->rho_rep ? p->eta / 2 * pow(1 / d - 1 / p->rho_rep, p->gamma) : 0;
 }
 
+static double repulsion(const struct lw_apf_params *p, double d)
+{
+    const struct lw_apf_field field = lw_apf_field_of(p, false);
+    return lw_apf_repulsion(&field, d);
+}
+
 // --- repulsion ---
 
 // The size of the force is minus the slope of the potential, for both exponents, all the way to rho.
@@ -49,7 +55,7 @@ static void repulsion_is_minus_the_slope_of_its_potential(void **state)
             const double d = random_in(&random, 0.01, 0.999 * p.rho_rep), h = 1e-4 * fmin(d, p.rho_rep - d);
             const double slope = (repulsion_potential(&p, d + h) - repulsion_potential(&p, d - h)) / (2 * h);
             const double scale = p.eta / (2 * d * d) * (gamma == 1 ? 1 : 2 * (1 / d - 1 / p.rho_rep));
-            assert_near(lw_apf_repulsion(&p, d), -slope, 1e-6 * scale);
+            assert_near(repulsion(&p, d), -slope, 1e-6 * scale);
         }
 }
 
@@ -59,12 +65,12 @@ static void the_reach_of_the_repulsion(void **state)
     (void)state;
     const struct lw_apf_params one = params(1, 0), two = params(2, 0);
     const double rho = one.rho_rep;
-    assert_near(lw_apf_repulsion(&one, rho), one.eta / (2 * rho * rho), 1e-15);
-    assert_near(lw_apf_repulsion(&one, nextafter(rho, 1)), 0, 0);
-    assert_near(lw_apf_repulsion(&two, rho), 0, 0);
-    assert_near(lw_apf_repulsion(&two, nextafter(rho, 1)), 0, 0);
-    assert_near(lw_apf_repulsion(&two, rho * (1 - 1e-9)), 0, 1e-8);
-    assert_true(lw_apf_repulsion(&two, rho * (1 - 1e-9)) > 0);
+    assert_near(repulsion(&one, rho), one.eta / (2 * rho * rho), 1e-15);
+    assert_near(repulsion(&one, nextafter(rho, 1)), 0, 0);
+    assert_near(repulsion(&two, rho), 0, 0);
+    assert_near(repulsion(&two, nextafter(rho, 1)), 0, 0);
+    assert_near(repulsion(&two, rho * (1 - 1e-9)), 0, 1e-8);
+    assert_true(repulsion(&two, rho * (1 - 1e-9)) > 0);
 }
 
 // Nearer than distance_min counts as distance_min, down to and into the obstacle: the force stays bounded.
@@ -74,13 +80,13 @@ static void small_distances_are_clamped(void **state)
     const double near[] = {0.00499, 1e-9, 0, -0.1, -5};
     for (int gamma = 1; gamma <= 2; gamma++) {
         const struct lw_apf_params p = params(gamma, 0);
-        const double most = lw_apf_repulsion(&p, p.distance_min);
+        const double most = repulsion(&p, p.distance_min);
         const double expected =
             gamma == 1 ? p.eta / (2 * 0.005 * 0.005) : p.eta * (1 / 0.005 - 1 / p.rho_rep) / (0.005 * 0.005);
         assert_near(most, expected, 1e-12 * expected);
-        assert_true(lw_apf_repulsion(&p, 0.00501) < most);
+        assert_true(repulsion(&p, 0.00501) < most);
         for (size_t i = 0; i < sizeof near / sizeof near[0]; i++)
-            assert_near(lw_apf_repulsion(&p, near[i]), most, 0);
+            assert_near(repulsion(&p, near[i]), most, 0);
     }
 }
 
@@ -92,7 +98,7 @@ static void repulsion_never_pulls(void **state)
         struct lw_apf_params p = params(gamma, 0);
         p.distance_min = 1;
         for (int cm = -100; cm < 200; cm++)
-            assert_true(lw_apf_repulsion(&p, 0.01 * cm) >= 0);
+            assert_true(repulsion(&p, 0.01 * cm) >= 0);
     }
 }
 
@@ -163,41 +169,60 @@ static void no_force_at_the_goal(void **state)
 
 // --- joints ---
 
+enum { BALLS_MAX = 5 };
+
 struct scene_of_balls {
+    enum lw_robot robot;
     struct lw_law_params law;
-    struct lw_pose frame[LW_NJ];
-    struct lw_world world;
-    double goal[3];
+    double q[LW_NJ], goal[3];
+    int count;
+    double centre[BALLS_MAX][3], radius[BALLS_MAX]; // ids from 10
 };
+
+static struct lw_snapshot world;
+static struct lw_surroundings around;
 
 static void random_scene(struct random *random, struct scene_of_balls *s)
 {
-    double q[LW_NJ];
-    *s = (struct scene_of_balls){.law = {.apf = params(1 + random_below(random, 2), random_below(random, 2))}};
+    *s = (struct scene_of_balls){.robot = (enum lw_robot)random_below(random, 2),
+                                 .law = {.apf = params(1 + random_below(random, 2), random_below(random, 2))},
+                                 .count = random_below(random, BALLS_MAX + 1)};
     s->law.apf.rho_rep = random_in(random, 0.2, 2);
-    random_fill(random, -3, 3, q, LW_NJ);
+    random_fill(random, -3, 3, s->q, LW_NJ);
     random_fill(random, -1, 1, s->goal, 3);
-    s->world.count = random_below(random, 6);
-    for (int k = 0; k < s->world.count; k++) {
-        s->world.obstacle[k] = (struct lw_obstacle){.id = 10 + k, .radius = random_in(random, 0, 0.2)};
-        random_fill(random, -1, 1, s->world.obstacle[k].p, 3);
+    for (int k = 0; k < s->count; k++) {
+        s->radius[k] = random_in(random, 0, 0.2);
+        random_fill(random, -1, 1, s->centre[k], 3);
     }
-    assert_int_equal(lw_arm_fk(lw_arm_get((enum lw_robot)random_below(random, 2)), q, s->frame), LW_OK);
 }
 
-static struct lw_law_output step(const struct scene_of_balls *s)
+// The law at the scene's configuration; the nearest pair of all is in *nearest.
+static void step(const struct scene_of_balls *s, double qd[LW_NJ], struct lw_near *nearest)
 {
-    const struct lw_law_input in = {.frame = s->frame, .world = &s->world, .goal = s->goal};
-    struct lw_law_output out;
-    memset(&out, 0x5a, sizeof out);
-    lw_law_get(LW_LAW_APF)->step(&s->law, &in, &out);
-    return out;
+    static const double no_circulation[3] = {0};
+    struct lw_body body;
+    lw_body_make(s->robot, LW_BODY_JOINTS, NULL, &body);
+    lw_snapshot_begin(&world);
+    for (int k = 0; k < s->count; k++) {
+        const struct lw_solid ball = {.kind = LW_SPHERE, .radius = s->radius[k]};
+        struct lw_pose pose = {.r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+        memcpy(pose.p, s->centre[k], sizeof pose.p);
+        assert_int_equal(lw_snapshot_add(&world, 10 + k, 1, &ball, &pose, NULL), LW_OK);
+    }
+    lw_snapshot_end(&world);
+    const struct lw_eyes eyes = {
+        .arm = lw_arm_get(s->robot), .body = &body, .world = &world, .reach = s->law.apf.rho_rep};
+    assert_int_equal(lw_surroundings_look(&eyes, s->q, &around), LW_OK);
+    const struct lw_law_input in = {.around = &around, .body = &body, .goal = s->goal, .circulation = no_circulation};
+    lw_law_get(LW_LAW_APF)->step(&s->law, &in, qd);
+    const struct lw_near_query all = {.body = &body, .placed = &around.placed, .world = &world, .d_max = HUGE_VAL};
+    lw_near_smallest(&all, nearest);
 }
 
-static void add_joint_effect(const struct scene_of_balls *s, int link, const double force[3], double qd[LW_NJ])
+static void add_joint_effect(int link, const double force[3], double qd[LW_NJ])
 {
     double jacobian[18];
-    lw_arm_point_jacobian(s->frame, link, s->frame[link - 1].p, jacobian);
+    lw_arm_point_jacobian(around.frame, link, around.frame[link - 1].p, jacobian);
     for (int j = 0; j < LW_NJ; j++)
         for (int i = 0; i < 3; i++)
             qd[j] += jacobian[LW_NJ * i + j] * force[i];
@@ -211,45 +236,46 @@ static void joints_follow_the_sum_of_transposed_jacobians(void **state)
     struct random random = {53};
     for (int n = 0; n < 500; n++) {
         static struct scene_of_balls s;
-        double expected[LW_NJ] = {0}, force[3], scale = 1;
-        struct lw_nearest nearest = {.clearance = HUGE_VAL};
+        double expected[LW_NJ] = {0}, force[3], scale = 1, qd[LW_NJ], smallest = HUGE_VAL;
+        struct lw_near nearest;
         random_scene(&random, &s);
-        lw_apf_attraction(&s.law.apf, s.frame[5].p, s.goal, force);
-        add_joint_effect(&s, LW_NJ, force, expected);
-        for (int k = 0; k < s.world.count; k++)
+        step(&s, qd, &nearest);
+        lw_apf_attraction(&s.law.apf, around.frame[5].p, s.goal, force);
+        add_joint_effect(LW_NJ, force, expected);
+        for (int k = 0; k < s.count; k++)
             for (int point = 1; point <= LW_NJ; point++) {
                 double away[3], push[3] = {0};
-                const double d = lw_obstacle_distance(&s.world.obstacle[k], s.frame[point - 1].p, away);
-                lw_vec_add_scaled(lw_apf_repulsion(&s.law.apf, d), away, push);
+                lw_vec_sub(around.frame[point - 1].p, s.centre[k], away);
+                const double n_away = lw_vec_norm(away), d = n_away - s.radius[k];
+                lw_vec_add_scaled(repulsion(&s.law.apf, d) / n_away, away, push);
                 scale += lw_vec_norm(push);
-                add_joint_effect(&s, point, push, expected);
-                if (point > 1 && (nearest.link == 0 || d < nearest.clearance))
-                    nearest = (struct lw_nearest){.clearance = d, .link = point, .obstacle = 10 + k};
+                add_joint_effect(point, push, expected);
+                smallest = point > 1 ? fmin(smallest, d) : smallest;
             }
-        const struct lw_law_output out = step(&s);
-        assert_all_near(out.qd, expected, LW_NJ, 1e-12 * scale);
-        assert_near(out.nearest.clearance, nearest.clearance, 0);
-        assert_int_equal(out.nearest.link, nearest.link);
-        assert_int_equal(out.nearest.obstacle, nearest.obstacle);
+        assert_all_near(qd, expected, LW_NJ, 1e-12 * scale);
+        assert_near(nearest.distance.d, smallest, 0);
     }
 }
 
-// An obstacle on a control point, or around the whole arm, gives finite speeds; on the point itself it has no
-// direction.
+// An obstacle on a control point, or around the whole arm, gives finite speeds.
 static void an_obstacle_on_a_control_point_stays_finite(void **state)
 {
     (void)state;
     struct random random = {54};
     for (int n = 0; n < 200; n++) {
         static struct scene_of_balls s;
+        struct lw_pose frame[LW_NJ];
+        struct lw_near nearest;
+        double qd[LW_NJ];
         random_scene(&random, &s);
-        s.world.count = 1;
-        memcpy(s.world.obstacle[0].p, s.frame[1 + n % 5].p, sizeof s.world.obstacle[0].p);
-        s.world.obstacle[0].radius = n % 3;
-        const struct lw_law_output out = step(&s);
-        assert_true(lw_all_finite(out.qd, LW_NJ));
-        assert_near(out.nearest.clearance, -(n % 3), 0);
-        assert_int_equal(out.nearest.link, 2 + n % 5);
+        s.count = 1;
+        assert_int_equal(lw_arm_fk(lw_arm_get(s.robot), s.q, frame), LW_OK);
+        memcpy(s.centre[0], frame[1 + n % 5].p, sizeof s.centre[0]);
+        s.radius[0] = n % 3;
+        step(&s, qd, &nearest);
+        assert_true(lw_all_finite(qd, LW_NJ));
+        assert_near(nearest.distance.d, -(n % 3), 0);
+        assert_int_equal(nearest.part, n % 5);
     }
 }
 
@@ -258,8 +284,9 @@ static void an_obstacle_on_a_control_point_stays_finite(void **state)
 enum { ROWS = 1001 };
 
 struct run {
-    double t[ROWS], q[ROWS][LW_NJ], qd[ROWS][LW_NJ], tip[ROWS][3], deviation[ROWS], distance[ROWS];
-    int flags[ROWS];
+    double t[ROWS], q[ROWS][LW_NJ], qd[ROWS][LW_NJ], tip[ROWS][3], deviation[ROWS], clearance[ROWS],
+        self_clearance[ROWS];
+    int flags[ROWS], outcome[ROWS];
 };
 
 static void run_case(int number, const char *const *set, int set_count, struct run *run)
@@ -271,8 +298,9 @@ static void run_case(int number, const char *const *set, int set_count, struct r
     if (lw_scene_load(path, set, set_count, &scene, &error) != LW_OK)
         fail_msg("%s", error.text);
     assert_int_equal(lw_scene_steps(&scene) + 1, ROWS);
-    const struct lw_batch_result result = {run->t,         &run->q[0][0], &run->qd[0][0], &run->tip[0][0],
-                                           run->deviation, run->distance, run->flags};
+    const struct lw_batch_result result = {run->t,         &run->q[0][0],  &run->qd[0][0],      &run->tip[0][0],
+                                           run->deviation, run->clearance, run->self_clearance, run->flags,
+                                           run->outcome};
     assert_int_equal(lw_batch_run(&scene, &result), LW_OK);
 }
 
@@ -305,7 +333,7 @@ static void deviation_does_not_fall_with_rho(void **state)
             // C1 and C2 chatter about the goal; the others are smooth.
             assert_near(last, expected[gamma - 1][number - 1], number <= 2 ? 0.01 : 1e-6);
             for (int k = 0; k < ROWS; k++) {
-                assert_true(run.distance[k] >= 1.58);
+                assert_true(run.clearance[k] >= 1.58);
                 assert_int_equal(run.flags[k], 0);
                 for (int j = 0; j < LW_NJ; j++)
                     assert_true(fabs(run.qd[k][j]) < 3.15);

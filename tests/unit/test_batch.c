@@ -16,8 +16,8 @@ enum { ROWS = 1001, GUARD_ROWS = 2, THREADS = 2 };
 
 struct run {
     double t[ROWS + GUARD_ROWS], q[ROWS + GUARD_ROWS][LW_NJ], qd[ROWS + GUARD_ROWS][LW_NJ], tip[ROWS + GUARD_ROWS][3];
-    double deviation[ROWS + GUARD_ROWS], distance[ROWS + GUARD_ROWS];
-    int flags[ROWS + GUARD_ROWS];
+    double deviation[ROWS + GUARD_ROWS], clearance[ROWS + GUARD_ROWS], self_clearance[ROWS + GUARD_ROWS];
+    int flags[ROWS + GUARD_ROWS], outcome[ROWS + GUARD_ROWS];
 };
 
 static struct lw_scene load(const char *name, const char *const *set, int set_count)
@@ -35,8 +35,9 @@ static struct lw_scene load(const char *name, const char *const *set, int set_co
 static enum lw_status run_scene(const struct lw_scene *scene, struct run *run)
 {
     memset(run, 0x5a, sizeof *run);
-    const struct lw_batch_result result = {run->t,         &run->q[0][0], &run->qd[0][0], &run->tip[0][0],
-                                           run->deviation, run->distance, run->flags};
+    const struct lw_batch_result result = {run->t,         &run->q[0][0],  &run->qd[0][0],      &run->tip[0][0],
+                                           run->deviation, run->clearance, run->self_clearance, run->flags,
+                                           run->outcome};
     return lw_batch_run(scene, &result);
 }
 
@@ -58,7 +59,7 @@ static void there_is_one_row_a_step_and_one_more(void **state)
         assert_same_bits(run.qd[rows], pattern.qd[rows], sizeof run.qd[0]);
         assert_same_bits(run.tip[rows], pattern.tip[rows], sizeof run.tip[0]);
         assert_same_bits(&run.deviation[rows], &pattern.deviation[rows], sizeof run.deviation[0]);
-        assert_same_bits(&run.distance[rows], &pattern.distance[rows], sizeof run.distance[0]);
+        assert_same_bits(&run.clearance[rows], &pattern.clearance[rows], sizeof run.clearance[0]);
         assert_same_bits(&run.flags[rows], &pattern.flags[rows], sizeof run.flags[0]);
     }
 }
@@ -125,7 +126,7 @@ static void a_scene_without_obstacles_runs(void **state)
     static struct run run;
     assert_int_equal(run_scene(&scene, &run), LW_OK);
     for (int k = 0; k < ROWS; k++)
-        assert_true(run.distance[k] == HUGE_VAL && run.flags[k] == 0);
+        assert_true(run.clearance[k] == HUGE_VAL && run.flags[k] == 0);
 }
 
 static void a_scene_of_no_robot_is_refused(void **state)

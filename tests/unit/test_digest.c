@@ -7,13 +7,14 @@
 // Memory   static.
 // Errors   cmocka's.
 #include "base/digest.h"
-#include "tick_rig.h" // start
+#include "collision/world.h" // lw_world_apply
+#include "tick_rig.h"        // start
 
 // All that a tick is given, in one piece, so that each of its bits can be changed.
 struct input {
     int64_t time_ns, state_age_ns;
     struct lw_joint_state joint;
-    struct lw_world world;
+    struct lw_snapshot world;
     struct lw_request request;
     bool warming_up;
 };
@@ -36,13 +37,19 @@ static int64_t digest_of(const struct rig *rig, const struct input *input)
 static struct input *make_input(struct rig *rig)
 {
     static struct input input;
-    input = (struct input){.time_ns = INT64_C(123456789012), .state_age_ns = 3456, .joint = rig->joint};
+    static struct lw_world world;
+    memset(&world, 0, sizeof world);
+    input.time_ns = INT64_C(123456789012);
+    input.state_age_ns = 3456;
+    input.joint = rig->joint;
+    input.warming_up = false;
     input.joint.qd[2] = 0.5;
     const struct lw_obstacle_change change = {.stamp = {1, 2, 3, 4},
                                               .count = 2,
                                               .obstacle = {{.id = 33, .p = {-0.35, -0.5, 0.36}, .radius = 0.08},
                                                            {.id = 34, .p = {0.5, 0.5, 0.5}, .radius = 0}}};
-    assert_int_equal(lw_world_apply(&input.world, &change), LW_OK);
+    assert_int_equal(lw_world_apply(&world, &change), LW_OK);
+    lw_world_build(&world, &input.world);
     input.request = (struct lw_request){.stamp = {11, 12, 5, 6}, .kind = LW_REQUEST_GOAL, .goal = {0.3, -0.5, 0.3}};
     return &input;
 }
@@ -78,6 +85,7 @@ static void every_bit_of_the_input_counts(void **state)
     CHECK_EVERY_BIT(input->joint.q);
     CHECK_EVERY_BIT(input->joint.qd);
     CHECK_EVERY_BIT(input->world.version);
+    CHECK_EVERY_BIT(input->world.last_channel);
     CHECK_EVERY_BIT(input->world.last.session);
     CHECK_EVERY_BIT(input->world.last.seq);
     CHECK_EVERY_BIT(input->world.digest);

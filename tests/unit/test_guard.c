@@ -33,7 +33,9 @@ static struct rig still_rig(double range, double velocity, double acceleration)
 
 static unsigned shape(const struct rig *rig, const double wish[LW_NJ], double command[LW_NJ])
 {
-    return lw_guard_shape(&rig->limits, rig->period_s, rig->q, rig->velocity, wish, command);
+    const struct lw_guard_input in = {
+        .limits = &rig->limits, .period_s = rig->period_s, .q = rig->q, .velocity = rig->velocity, .wish = wish};
+    return lw_guard_shape(&in, command);
 }
 
 // One tick: shape, then move as commanded.

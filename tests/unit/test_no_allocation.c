@@ -13,6 +13,8 @@
 #include "bus/gate.h" // lw_gate_judge
 #include "controller/tick.h"
 #include "datagram_packets.h" // make_packet
+#include "balls.h"
+#include "collision/world.h" // lw_world_apply
 #include "helpers.h"
 #include "program/allocations.h" // lw_allocations_*
 #include "simulator/plant.h"
@@ -31,7 +33,7 @@ struct rig {
     struct lw_controller_state state;
     struct lw_plant plant;
     struct lw_plant_state arm;
-    struct lw_world world;
+    struct lw_snapshot world;
     struct lw_request request;
     struct lw_gate gate;
     struct lw_lease lease;
@@ -72,9 +74,9 @@ static void tick_plant_and_wire_allocate_nothing(void **state)
     rig.scene.plant.rate_hz = rig.scene.rate_hz;
     assert_int_equal(lw_controller_init(&rig.config, &rig.state, &rig.scene, 2), LW_OK);
     lw_plant_init(&rig.plant, &rig.arm, &rig.scene, 1);
-    rig.world = (struct lw_world){.version = 1, .count = 3};
-    for (int i = 0; i < 3; i++)
-        rig.world.obstacle[i] = (struct lw_obstacle){.id = 1 + i, .p = {0.3 * i - 0.5, -0.6, 0.3}, .radius = 0.05};
+    const double at[3][3] = {{-0.5, -0.6, 0.3}, {-0.2, -0.6, 0.3}, {0.1, -0.6, 0.3}};
+    rig.world.version = 1;
+    put_balls(&rig.world, 1, at, 3, 0.05);
     rig.gate = (struct lw_gate){.plant_session = 1, .velocity = {9, 9, 9, 9, 9, 9}};
     lw_ring_init(&rig.ring, rig.slots, sizeof rig.slots[0], 2);
     int refused = 0;

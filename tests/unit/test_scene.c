@@ -45,11 +45,17 @@ static void refuse(const char *set, const char *words)
 // All values, to the last bit; padding is not looked at.
 static void check_same_law(const struct lw_law_params *a, const struct lw_law_params *b)
 {
-    const double a_gains[] = {a->apf.k_a, a->apf.r0, a->apf.eta, a->apf.rho_rep, a->apf.distance_min};
-    const double b_gains[] = {b->apf.k_a, b->apf.r0, b->apf.eta, b->apf.rho_rep, b->apf.distance_min};
+    const double a_gains[] = {a->apf.k_a,      a->apf.r0,           a->apf.eta,
+                              a->apf.rho_rep,  a->apf.distance_min, a->apf.approach_s,
+                              a->apf.eta_self, a->apf.rho_self,     a->remedy.circulation};
+    const double b_gains[] = {b->apf.k_a,      b->apf.r0,           b->apf.eta,
+                              b->apf.rho_rep,  b->apf.distance_min, b->apf.approach_s,
+                              b->apf.eta_self, b->apf.rho_self,     b->remedy.circulation};
     assert_same_bits(a_gains, b_gains, sizeof a_gains);
-    assert_true(a->name == b->name && a->apf.control_points == b->apf.control_points);
+    assert_true(a->name == b->name && a->control_points == b->control_points);
     assert_true(a->apf.attraction == b->apf.attraction && a->apf.gamma == b->apf.gamma);
+    assert_int_equal(a->remedy.kind, b->remedy.kind);
+    assert_same_bits(a->remedy.axis, b->remedy.axis, sizeof a->remedy.axis);
 }
 
 static void check_same_scene(const struct lw_scene *a, const struct lw_scene *b)

@@ -10,6 +10,7 @@
 // Errors   cmocka's.
 #include "bus/gate.h"
 #include "controller/tick.h"
+#include "balls.h"
 #include "helpers.h"
 #include "simulator/plant.h"
 
@@ -78,7 +79,7 @@ struct spine {
     struct lw_plant_state arm;
     struct lw_gate gate;
     struct lw_lease lease;
-    struct lw_world world;
+    struct lw_snapshot world;
     struct control control[CONTROLLERS];
     int64_t now_ns, state_seq, next_session;
     struct lw_joint_command command; // newest taken
@@ -107,8 +108,9 @@ static struct spine *start(uint64_t seed)
     s.gate =
         (struct lw_gate){.plant_session = PLANT, .open_ns = s.now_ns + 250 * ms, .lease_ns = lease_ns, .max_lag = 20};
     memcpy(s.gate.velocity, s.plant.velocity, sizeof s.gate.velocity);
-    s.world = (struct lw_world){.version = 1, .count = 1};
-    s.world.obstacle[0] = (struct lw_obstacle){.id = 1, .p = {-0.35, -0.5, 0.36}, .radius = 0.08};
+    const double at[1][3] = {{-0.35, -0.5, 0.36}};
+    s.world.version = 1;
+    put_balls(&s.world, 1, at, 1, 0.08);
     for (int i = 0; i < CONTROLLERS; i++)
         start_controller(&s, i);
     return &s;

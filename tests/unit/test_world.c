@@ -55,49 +55,6 @@ static int64_t owner_of(const struct lw_world *world, int id)
     return 0;
 }
 
-// --- distance ---
-
-// Distance to the surface, and its gradient by central differences, from outside and from inside.
-static void direction_is_the_gradient_of_distance(void **state)
-{
-    (void)state;
-    struct random random = {41};
-    for (int n = 0; n < 1000; n++) {
-        struct lw_obstacle o = {.radius = random_in(&random, 0, 1)};
-        double x[3], away[3], gap[3], unused[3];
-        random_fill(&random, -1, 1, o.p, 3);
-        random_fill(&random, -1, 1, x, 3);
-        lw_vec_sub(x, o.p, gap);
-        assert_near(lw_obstacle_distance(&o, x, away), lw_vec_norm(gap) - o.radius, 1e-15);
-        if (lw_vec_norm(gap) < 0.05)
-            continue; // too near the centre for differences
-        for (int i = 0; i < 3; i++) {
-            double ahead[3], behind[3];
-            memcpy(ahead, x, sizeof x);
-            memcpy(behind, x, sizeof x);
-            ahead[i] += 1e-6;
-            behind[i] -= 1e-6;
-            const double slope =
-                (lw_obstacle_distance(&o, ahead, unused) - lw_obstacle_distance(&o, behind, unused)) / 2e-6;
-            assert_near(away[i], slope, 1e-8);
-        }
-        assert_near(lw_vec_norm(away), 1, 1e-15);
-    }
-}
-
-// At the centre there is no direction, and no NaN; right beside it there is one.
-static void the_centre_has_no_direction(void **state)
-{
-    (void)state;
-    const struct lw_obstacle o = {.p = {0.25, 0.5, 1}, .radius = 0.125};
-    const double zero[3] = {0}, up[3] = {0, 0, 1};
-    double away[3], beside[3] = {0.25, 0.5, nextafter(1, 2)};
-    assert_near(lw_obstacle_distance(&o, o.p, away), -0.125, 0);
-    assert_all_near(away, zero, 3, 0);
-    (void)lw_obstacle_distance(&o, beside, away);
-    assert_all_near(away, up, 3, 0);
-}
-
 // --- operations ---
 
 static void upsert_adds_and_overwrites_by_id(void **state)
@@ -284,14 +241,14 @@ static void a_full_world_refuses_whole_changes(void **state)
     (void)state;
     static struct lw_world world, before;
     memset(&world, 0, sizeof world);
-    fill(&world, LW_WORLD_MAX - 1);
+    fill(&world, LW_REGISTRY_MAX - 1);
     struct lw_obstacle_change c = change(YOURS, 1, LW_UPSERT, ball(901, 1), ball(902, 2));
     memcpy(&before, &world, sizeof world); // padding too
     assert_int_equal(lw_world_apply(&world, &c), LW_E_FULL);
     assert_same_bits(&world, &before, sizeof world);
 
     apply(&world, YOURS, LW_UPSERT, ball(901, 1), none);
-    assert_int_equal(world.count, LW_WORLD_MAX);
+    assert_int_equal(world.count, LW_REGISTRY_MAX);
     apply(&world, YOURS, LW_UPSERT, ball(901, 5), ball(1, 5)); // overwriting needs no room
     assert_near(get(&world, 1).p[0], 5, 0);
     memcpy(&before, &world, sizeof world); // padding too
@@ -306,7 +263,7 @@ static void replace_makes_room_first(void **state)
     (void)state;
     static struct lw_world world;
     memset(&world, 0, sizeof world);
-    fill(&world, LW_WORLD_MAX);
+    fill(&world, LW_REGISTRY_MAX);
     apply(&world, MINE, LW_REPLACE, ball(901, 1), ball(902, 1));
     assert_int_equal(world.count, 2);
 }
@@ -347,8 +304,6 @@ static void random_changes_match_a_plain_model(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(direction_is_the_gradient_of_distance),
-        cmocka_unit_test(the_centre_has_no_direction),
         cmocka_unit_test(upsert_adds_and_overwrites_by_id),
         cmocka_unit_test(remove_reaches_every_source),
         cmocka_unit_test(replace_is_the_whole_set_of_one_source),

@@ -9,6 +9,7 @@
 #ifndef LW_TESTS_TICK_RIG_H
 #define LW_TESTS_TICK_RIG_H
 
+#include "balls.h"
 #include "controller/tick.h"
 #include "helpers.h"
 
@@ -21,7 +22,7 @@ struct rig {
     struct lw_controller config;
     struct lw_controller_state state;
     struct lw_joint_state joint;
-    struct lw_world world;
+    struct lw_snapshot world;
     struct lw_request request;
     int64_t age_ns;
     bool warming_up;

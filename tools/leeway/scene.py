@@ -96,9 +96,12 @@ class Run:
     q, qd : (n, 6) rad and rad/s, configuration and the velocity commanded at it
     tip : (n, 3) m
     deviation : (n,) m, tip to goal
-    distance : (n,) m, smallest distance of a moving control point to an obstacle's surface;
-        -1 without obstacles
+    clearance : (n,) m, smallest distance of the arm, or of a moving control point, to an obstacle's
+        surface; infinite without obstacles
+    self_clearance : (n,) m, smallest distance of links watched against each other; infinite where
+        none is near
     flags : (n,) what shaped the command, bits of joint_command_t
+    outcome : (n,) how the law fared, law_outcome of joint_command_t: 1 ok, 2 no number, 3 stuck
     """
 
     scene: Scene
@@ -107,8 +110,10 @@ class Run:
     qd: Array
     tip: Array
     deviation: Array
-    distance: Array
+    clearance: Array
+    self_clearance: Array
     flags: npt.NDArray[np.int32]
+    outcome: npt.NDArray[np.int32]
 
 
 def simulate(scene: Scene | str | Path) -> Run:

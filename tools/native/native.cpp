@@ -111,10 +111,18 @@ Output<double> jacobian(const Arm &arm, const Input &q)
 nb::dict simulate(const Scene &scene)
 {
     const size_t rows = static_cast<size_t>(lw_scene_steps(&scene.data)) + 1;
-    Owned<double> t({rows}), q({rows, LW_NJ}), qd({rows, LW_NJ}), tip({rows, 3}), deviation({rows}), distance({rows});
-    Owned<int> flags({rows});
-    const lw_batch_result result = {t.data.get(),         q.data.get(),        qd.data.get(),   tip.data.get(),
-                                    deviation.data.get(), distance.data.get(), flags.data.get()};
+    Owned<double> t({rows}), q({rows, LW_NJ}), qd({rows, LW_NJ}), tip({rows, 3}), deviation({rows}), clearance({rows}),
+        self_clearance({rows});
+    Owned<int> flags({rows}), outcome({rows});
+    const lw_batch_result result = {t.data.get(),
+                                    q.data.get(),
+                                    qd.data.get(),
+                                    tip.data.get(),
+                                    deviation.data.get(),
+                                    clearance.data.get(),
+                                    self_clearance.data.get(),
+                                    flags.data.get(),
+                                    outcome.data.get()};
     lw_status status = LW_OK;
     {
         nb::gil_scoped_release released;
@@ -128,8 +136,10 @@ nb::dict simulate(const Scene &scene)
     out["qd"] = qd.release();
     out["tip"] = tip.release();
     out["deviation"] = deviation.release();
-    out["distance"] = distance.release();
+    out["clearance"] = clearance.release();
+    out["self_clearance"] = self_clearance.release();
     out["flags"] = flags.release();
+    out["outcome"] = outcome.release();
     return out;
 }
 

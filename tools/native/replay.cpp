@@ -17,12 +17,16 @@
 #include <algorithm> // copy
 #include <array>
 #include <cstdint>   // int64_t
+#include <cstdlib>   // calloc
+#include <memory>    // shared_ptr
+#include <new>       // bad_alloc
 #include <optional>  // optional
 #include <stdexcept> // invalid_argument
 #include <string>    // string
 
 extern "C" {
 #include "bus/wire.h"        // lw_wire_*
+#include "collision/world.h" // lw_world_apply
 #include "controller/tick.h" // lw_tick
 }
 
@@ -58,12 +62,25 @@ nb::bytes acceptable(const std::string &channel, const nb::bytes &messages)
 
 struct World {
     lw_world data = {};
+    std::shared_ptr<lw_snapshot> seen = build(); // as the tick sees it
+
+    std::shared_ptr<lw_snapshot> build() const
+    {
+        auto *snapshot = static_cast<lw_snapshot *>(std::calloc(1, sizeof(lw_snapshot)));
+        if (snapshot == nullptr)
+            throw std::bad_alloc();
+        lw_world_build(&data, snapshot);
+        return {snapshot, std::free};
+    }
 
     bool apply(const nb::bytes &change, bool hull)
     {
         lw_message message;
-        return decode(hull ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES, change, message) &&
-               lw_world_apply(&data, &message.obstacles) == LW_OK;
+        if (!decode(hull ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES, change, message) ||
+            lw_world_apply(&data, &message.obstacles) != LW_OK)
+            return false;
+        seen = build();
+        return true;
     }
 
     // What a command echoes of its world.
@@ -78,6 +95,7 @@ struct World {
         data.last.session = session;
         data.last.seq = seq;
         data.version = version;
+        seen = build();
     }
 
     nb::list obstacles() const
@@ -126,7 +144,7 @@ struct Controller {
     // A request counts for one tick: its repetitions change nothing.
     nb::bytes tick(int64_t time_ns, int64_t state_age_ns, bool warming_up, const World &world)
     {
-        const lw_tick_input in = {time_ns, state_age_ns, warming_up, &joint, &world.data, &asked};
+        const lw_tick_input in = {time_ns, state_age_ns, warming_up, &joint, world.seen.get(), &asked};
         lw_message message = {};
         unsigned char wire[LW_WIRE_MAX];
         before = state;
@@ -176,6 +194,8 @@ void bind_replay(nb::module_ &m)
         .def("adopt", &World::adopt, nb::arg("session"), nb::arg("seq"), nb::arg("version"),
              "Takes the echo of a command for a world whose history is not known.")
         .def("obstacles", &World::obstacles, "(id, (x, y, z) m, radius m) of each, in the controller's order.")
+        .def_prop_ro(
+            "channel", [](const World &w) { return w.data.last_channel; }, "Channel of the newest message.")
         .def_prop_ro("echo", &World::echo, "Session and seq of the newest message, number of changes.")
         .def_prop_ro(
             "count", [](const World &w) { return w.data.count; }, "Number of obstacles.")

@@ -153,6 +153,7 @@ def input_words(
     words = [integer("digest of the scene", scene_digest)]
     words += [integer(f"JOINT_STATE {n}", int(v)) for n, v in zip(names, values, strict=True)]
     echo = zip(("session", "seq", "version"), world.echo, strict=True)
+    words.append(integer("world channel", world.channel))
     words += [integer(f"world {name}", value) for name, value in echo]
     words.append(integer(WORLD_DIGEST, world.digest))
     request = (int(command["request_session"]), int(command["request_seq"]))

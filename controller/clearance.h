@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Clearance: how much of a velocity the room to obstacles and between links leaves. The guard's stage between velocity
+// and acceleration limits; it knows distances, not laws.
+//
+// Units    metres, radians, seconds.
+// Frames   base frame of the arm.
+// Arrays   one entry a joint, base to wrist 3.
+// Memory   the caller's; nothing is allocated.
+// Errors   none.
+#ifndef LW_CONTROLLER_CLEARANCE_H
+#define LW_CONTROLLER_CLEARANCE_H
+
+#include "controller/guard.h"        // lw_guard_shape
+#include "controller/surroundings.h" // struct lw_surroundings
+
+#include <stdbool.h> // bool
+
+// What a near pair leaves: the arm may close in on it only so fast that it can still stop.
+struct lw_room {
+    double gradient[LW_NJ]; // m/rad, of the distance by the joint positions
+    double room;            // m, distance less the one to keep
+    double approach;        // m/s, how fast the obstacle comes by itself, >= 0
+};
+
+struct lw_rooms {
+    int count;
+    struct lw_room room[LW_NEAR_MAX];
+};
+
+// Distance (m) within which lw_clearance_command may have something to say, at a velocity in force: the way of the
+// fastest point of the arm until it rests, and that of the fastest obstacle.
+double lw_clearance_reach(const struct lw_limits *limits, double period_s, const double velocity[LW_NJ],
+                          double obstacle_speed);
+
+// Lists the rooms of all near pairs. With the clearance off there are none.
+void lw_clearance_rooms(const struct lw_limits *limits, const struct lw_body *body, const struct lw_surroundings *s,
+                        struct lw_rooms *rooms);
+
+// Largest part in [0, 1] of a velocity that can be braked to rest within every room. Braking along a straight line in
+// joint space takes T = max |qd_j| / a_j; with c = -gradient . qd the pair needs c (T/2 + period) of its room, and
+// approach (T + period) more where the obstacle comes by itself. A velocity that does not close in on a pair does not
+// ask for its room.
+double lw_clearance_part(const struct lw_limits *limits, double period_s, const struct lw_rooms *rooms,
+                         const double velocity[LW_NJ]);
+
+// lw_guard_shape with the clearance: the wish is scaled to its allowed part; where the acceleration limits would still
+// lead too near, the arm is braked along its way instead. Adds LW_LIMIT_CLEARANCE.
+unsigned lw_clearance_command(const struct lw_guard_input *in, const struct lw_rooms *rooms, double command[LW_NJ]);
+
+#endif

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Roll-outs of circulations.
+//
+// Units    metres, radians, seconds; ns where a name says so.
+// Frames   base frame of the arm.
+// Arrays   one entry a joint.
+// Memory   see escape.h; the surroundings of a step are on the stack.
+// Errors   none.
+#include "controller/escape.h"
+
+#include "base/clock.h"           // LW_NS_PER_S
+#include "base/vec.h"             // lw_vec_*
+#include "controller/clearance.h" // lw_clearance_command
+
+#include <math.h>   // fmin, HUGE_VAL
+#include <string.h> // memcpy
+
+enum { CANDIDATES = 5, STEPS = 375 };
+static const int64_t step_ns = 8 * 1000 * 1000;
+static const int64_t share_ns = 125 * 1000; // of the tick's period for one step: a roll-out takes a quarter of a second
+static const double worth_m = 0.02;         // a direction has to bring the tip this much nearer
+static const int64_t patience_ns = LW_NS_PER_S; // after an attempt, doubled with each one ...
+enum { PATIENCE_DOUBLINGS = 3 };
+static const int64_t progress_ns = 5 * LW_NS_PER_S; // without coming nearer for this long it goes in circles
+
+void lw_escape_reset(struct lw_escape *escape, const struct lw_remedy_params *params)
+{
+    *escape = (struct lw_escape){.rollout = {.candidate = -1}};
+    if (params->kind == LW_REMEDY_VORTEX)
+        for (int i = 0; i < 3; i++)
+            escape->circulation[i] = params->circulation * params->axis[i];
+}
+
+void lw_escape_pause(struct lw_escape *escape)
+{
+    lw_stuck_reset(&escape->stuck);
+    escape->rollout.candidate = -1;
+    escape->nearest_ns = 0;
+}
+
+// Direction to try: none, to either side of the way to the goal, over or under it.
+static void candidate_circulation(int candidate, double strength, const struct lw_escape_now *now, double out[3])
+{
+    const double way[2] = {now->goal[0] - now->tip[0], now->goal[1] - now->tip[1]};
+    const double length = hypot(way[0], way[1]);
+    const double across[3] = {length > 0 ? -way[1] / length : 1, length > 0 ? way[0] / length : 0, 0};
+    const double up[3] = {0, 0, 1};
+    const double *axis = candidate <= 2 ? up : across;
+    const double sign = candidate == 0 ? 0 : candidate % 2 == 1 ? -1 : 1;
+    for (int i = 0; i < 3; i++)
+        out[i] = sign * strength * axis[i];
+}
+
+// Starts a candidate from where the arm was.
+static void begin(struct lw_escape *escape, int candidate, const struct lw_remedy_params *params,
+                  const struct lw_escape_now *now)
+{
+    struct lw_rollout *rollout = &escape->rollout;
+    rollout->candidate = candidate;
+    rollout->steps = 0;
+    memcpy(rollout->q, rollout->from_q, sizeof rollout->q);
+    memcpy(rollout->velocity, rollout->from_velocity, sizeof rollout->velocity);
+    // Later attempts turn harder.
+    const double strength = params->circulation * (1 + escape->attempts % 3);
+    candidate_circulation(candidate, strength, now, rollout->circulation);
+}
+
+// One step of law, guard and plant. Returns the deviation before it, infinite when the arm is nowhere.
+static double roll(struct lw_rollout *rollout, const struct lw_escape_model *model, const struct lw_escape_now *now)
+{
+    const double period_s = (double)step_ns / (double)LW_NS_PER_S;
+    const struct lw_law_reach reach = model->law->reach(model->params, now->world->speed_max);
+    const double brake = lw_clearance_reach(model->limits, period_s, rollout->velocity, now->world->speed_max);
+    const struct lw_eyes eyes = {.arm = model->arm,
+                                 .body = model->body,
+                                 .world = now->world,
+                                 .time_ns = rollout->from_ns + rollout->steps * step_ns,
+                                 .reach = fmax(reach.obstacles, brake),
+                                 .self_reach = fmax(reach.self, brake)};
+    struct lw_surroundings around;
+    struct lw_rooms rooms;
+    double wish[LW_NJ], to_goal[3];
+    if (lw_surroundings_look(&eyes, rollout->q, &around) != LW_OK)
+        return HUGE_VAL;
+    const struct lw_law_input in = {
+        .around = &around, .body = model->body, .goal = now->goal, .circulation = rollout->circulation};
+    model->law->step(model->params, &in, wish);
+    lw_clearance_rooms(model->limits, model->body, &around, &rooms);
+    const struct lw_guard_input guard = {
+        .limits = model->limits, .period_s = period_s, .q = rollout->q, .velocity = rollout->velocity, .wish = wish};
+    double command[LW_NJ];
+    (void)lw_clearance_command(&guard, &rooms, command);
+    for (int j = 0; j < LW_NJ; j++)
+        rollout->q[j] += period_s * command[j];
+    memcpy(rollout->velocity, command, sizeof command);
+    lw_vec_sub(now->goal, around.frame[LW_NJ - 1].p, to_goal);
+    return lw_vec_norm(to_goal);
+}
+
+// Takes the best direction of a finished roll-out, or waits before the next one.
+static void decide(struct lw_escape *escape, const struct lw_escape_now *now)
+{
+    struct lw_rollout *rollout = &escape->rollout;
+    rollout->candidate = -1;
+    const int doublings = escape->attempts < PATIENCE_DOUBLINGS ? escape->attempts : PATIENCE_DOUBLINGS;
+    escape->wait_until_ns = now->time_ns + (patience_ns << doublings);
+    escape->attempts++;
+    if (rollout->best > now->deviation - worth_m)
+        return;
+    memcpy(escape->circulation, rollout->best_circulation, sizeof escape->circulation);
+    lw_stuck_reset(&escape->stuck);
+    escape->nearest = now->deviation;
+    escape->nearest_ns = now->time_ns;
+}
+
+// Goes on with a roll-out by as many steps as a tick may take.
+static void roll_on(struct lw_escape *escape, const struct lw_escape_model *model, const struct lw_escape_now *now)
+{
+    struct lw_rollout *rollout = &escape->rollout;
+    for (int64_t left_ns = now->period_ns; left_ns > 0 && rollout->candidate >= 0; left_ns -= share_ns) {
+        const double deviation = roll(rollout, model, now);
+        if (++rollout->steps < STEPS)
+            continue;
+        if (deviation < rollout->best) {
+            rollout->best = deviation;
+            memcpy(rollout->best_circulation, rollout->circulation, sizeof rollout->best_circulation);
+        }
+        if (rollout->candidate + 1 < CANDIDATES)
+            begin(escape, rollout->candidate + 1, &model->params->remedy, now);
+        else
+            decide(escape, now);
+    }
+}
+
+// Whether the tip has not come nearer for long, moving or not.
+static bool is_idle(struct lw_escape *escape, const struct lw_escape_now *now)
+{
+    if (escape->nearest_ns == 0 || now->deviation < escape->nearest - worth_m) {
+        escape->nearest = now->deviation;
+        escape->nearest_ns = now->time_ns;
+    }
+    return now->time_ns - escape->nearest_ns > progress_ns;
+}
+
+bool lw_escape_step(struct lw_escape *escape, const struct lw_escape_model *model, const struct lw_escape_now *now)
+{
+    const double tolerance = model->law->tolerance(model->params);
+    const bool stuck = lw_stuck_note(&escape->stuck, now->deviation, tolerance, now->period_ns, now->time_ns);
+    if (model->params->remedy.kind != LW_REMEDY_ROLLOUT)
+        return stuck;
+    const bool arrived = now->deviation < tolerance, idle = is_idle(escape, now) && !arrived;
+    if (arrived)
+        memset(escape->circulation, 0, sizeof escape->circulation);
+    if ((stuck || idle) && escape->rollout.candidate < 0 && now->time_ns >= escape->wait_until_ns) {
+        struct lw_rollout *rollout = &escape->rollout;
+        rollout->from_ns = now->time_ns;
+        rollout->best = HUGE_VAL;
+        memcpy(rollout->from_q, now->q, sizeof rollout->from_q);
+        memcpy(rollout->from_velocity, now->velocity, sizeof rollout->from_velocity);
+        begin(escape, 0, &model->params->remedy, now);
+    }
+    roll_on(escape, model, now);
+    return stuck;
+}

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Detector of standstill away from the goal.
+//
+// Units    metres; ns where a name says so.
+// Frames   none.
+// Arrays   none.
+// Memory   see stuck.h.
+// Errors   none.
+#include "controller/stuck.h"
+
+#include <math.h> // fmin, fmax
+
+static const double band = 0.01; // m
+static const int64_t sample_ns = 8 * 1000 * 1000, window_ns = 800 * 1000 * 1000;
+
+void lw_stuck_reset(struct lw_stuck *stuck)
+{
+    stuck->ticks = 0;
+    stuck->count = 0;
+    stuck->since_ns = 0;
+}
+
+// Whole periods that a time takes at least.
+static int64_t periods_in(int64_t time_ns, int64_t period_ns)
+{
+    return (time_ns + period_ns - 1) / period_ns;
+}
+
+// Width of the band in which the samples lie.
+static double spread(const struct lw_stuck *stuck, int count)
+{
+    double low = stuck->deviation[0], high = low;
+    for (int i = 1; i < count; i++) {
+        low = fmin(low, stuck->deviation[i]);
+        high = fmax(high, stuck->deviation[i]);
+    }
+    return high - low;
+}
+
+bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, int64_t period_ns, int64_t time_ns)
+{
+    const int64_t every = periods_in(sample_ns, period_ns);
+    const int length = (int)periods_in(window_ns, every * period_ns) + 1; // at most LW_STUCK_SAMPLES
+    const int64_t tick = stuck->ticks++;
+    if (tick % every != 0)
+        return stuck->since_ns != 0;
+    stuck->deviation[tick / every % length] = deviation;
+    stuck->count = stuck->count < length ? stuck->count + 1 : length;
+    const bool still = stuck->count == length && deviation > tolerance && spread(stuck, length) < band;
+    if (!still)
+        stuck->since_ns = 0;
+    else if (stuck->since_ns == 0)
+        stuck->since_ns = time_ns;
+    return still;
+}

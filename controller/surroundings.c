@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Looking around.
+//
+// Units    see surroundings.h.
+// Frames   base frame of the arm.
+// Arrays   see surroundings.h.
+// Memory   none.
+// Errors   see surroundings.h.
+#include "controller/surroundings.h"
+
+#include <stddef.h> // NULL
+
+enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[LW_NJ], struct lw_surroundings *out)
+{
+    const enum lw_status status = lw_arm_fk(eyes->arm, q, out->frame);
+    if (status != LW_OK)
+        return status;
+    lw_body_place(eyes->body, out->frame, &out->placed);
+    const struct lw_near_query query = {.body = eyes->body,
+                                        .placed = &out->placed,
+                                        .world = eyes->world,
+                                        .time_ns = eyes->time_ns,
+                                        .d_max = eyes->reach,
+                                        .warm = eyes->warm};
+    lw_near_range(&query, &out->near);
+    lw_near_self(eyes->body, &out->placed, eyes->self_reach, &out->near);
+    return LW_OK;
+}
+
+// Adds the effect of moving a point of a link along n: n . J.
+static void add_effect(const struct lw_surroundings *s, int link, const double point[3], const double n[3], double sign,
+                       double gradient[LW_NJ])
+{
+    double jacobian[3 * LW_NJ];
+    lw_arm_point_jacobian(s->frame, link, point, jacobian);
+    for (int j = 0; j < LW_NJ; j++)
+        gradient[j] += sign * (n[0] * jacobian[j] + n[1] * jacobian[LW_NJ + j] + n[2] * jacobian[2 * LW_NJ + j]);
+}
+
+void lw_surroundings_gradient(const struct lw_surroundings *s, const struct lw_body *body, const struct lw_near *pair,
+                              double gradient[LW_NJ])
+{
+    const struct lw_distance *d = &pair->distance;
+    for (int j = 0; j < LW_NJ; j++)
+        gradient[j] = 0;
+    add_effect(s, body->part[pair->part].link, d->pa, d->n, 1, gradient);
+    if (pair->obstacle == 0)
+        add_effect(s, body->part[pair->other].link, d->pb, d->n, -1, gradient);
+}
+
+const struct lw_near *lw_surroundings_nearest(const struct lw_surroundings *s, bool self)
+{
+    const struct lw_near *nearest = NULL;
+    for (int i = 0; i < s->near.count; i++) {
+        const struct lw_near *pair = &s->near.pair[i];
+        if ((pair->obstacle == 0) == self && (nearest == NULL || pair->distance.d < nearest->distance.d))
+            nearest = pair;
+    }
+    return nearest;
+}

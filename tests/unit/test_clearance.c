@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tests of the guard's clearance, two-sided: no pair comes nearer than it may, and no velocity is cut that need not be.
+//
+// Units    metres, radians, seconds.
+// Frames   base frame.
+// Arrays   one entry a joint.
+// Memory   static where results are large.
+// Errors   cmocka's.
+#include "arm/joint.h" // enum lw_flag
+#include "controller/clearance.h"
+#include "helpers.h"
+
+static const double period_s = 0.002;
+
+static struct lw_limits limits(double acceleration)
+{
+    struct lw_limits limits = {.clearance = 0.01};
+    for (int j = 0; j < LW_NJ; j++) {
+        limits.position_min[j] = -6;
+        limits.position_max[j] = 6;
+        limits.velocity[j] = 3;
+        limits.acceleration[j] = acceleration;
+    }
+    return limits;
+}
+
+// Random rooms; each gradient is that of a lever of up to a metre.
+static struct lw_rooms *random_rooms(struct random *random, int count, double room_max)
+{
+    static struct lw_rooms rooms;
+    rooms.count = count;
+    for (int i = 0; i < count; i++) {
+        random_fill(random, -1, 1, rooms.room[i].gradient, LW_NJ);
+        rooms.room[i].room = random_in(random, -0.01, room_max);
+        rooms.room[i].approach = random_below(random, 3) == 0 ? random_in(random, 0, 0.5) : 0;
+    }
+    return &rooms;
+}
+
+// Way towards a pair while the arm brakes in a straight line, tick by tick, and the obstacle's own way meanwhile.
+static double way_until_rest(const struct lw_limits *l, const struct lw_room *room, const double velocity[LW_NJ])
+{
+    double time = 0, closing = 0, way = 0;
+    for (int j = 0; j < LW_NJ; j++) {
+        time = fmax(time, fabs(velocity[j]) / l->acceleration[j]);
+        closing -= room->gradient[j] * velocity[j];
+    }
+    for (double t = 0; t < time; t += period_s)
+        way += period_s * (closing * fmax(1 - t / time, 0) + room->approach);
+    return way;
+}
+
+static bool closes(const struct lw_room *room, const double velocity[LW_NJ])
+{
+    double rate = 0;
+    for (int j = 0; j < LW_NJ; j++)
+        rate += room->gradient[j] * velocity[j];
+    return rate < 0;
+}
+
+// The allowed part can be braked within every room; a part a little larger needs more than one of them has by the
+// formula of the header, and a part of one is only given where everything fits.
+static void the_part_is_the_largest_that_can_be_braked(void **state)
+{
+    (void)state;
+    struct random random = {71};
+    int cut = 0, whole = 0, stopped = 0;
+    for (int n = 0; n < 5000; n++) {
+        const struct lw_limits l = limits(random_in(&random, 2, 20));
+        const struct lw_rooms *rooms = random_rooms(&random, 1 + (int)random_below(&random, 6), 0.6);
+        double velocity[LW_NJ], part_of[LW_NJ];
+        random_fill(&random, -2, 2, velocity, LW_NJ);
+        const double part = lw_clearance_part(&l, period_s, rooms, velocity);
+        assert_true(part >= 0 && part <= 1);
+        double time = 0, tightest = HUGE_VAL;
+        for (int j = 0; j < LW_NJ; j++) {
+            part_of[j] = part * velocity[j];
+            time = fmax(time, fabs(velocity[j]) / l.acceleration[j]);
+        }
+        for (int i = 0; i < rooms->count; i++) {
+            const struct lw_room *room = &rooms->room[i];
+            if (!closes(room, velocity))
+                continue;
+            double closing = 0;
+            for (int j = 0; j < LW_NJ; j++)
+                closing -= room->gradient[j] * velocity[j];
+            const double left = room->room - room->approach * (time + period_s);
+            const double need = part * closing * (part * time / 2 + period_s);
+            tightest = fmin(tightest, left - need);
+            if (part > 0)
+                assert_true(way_until_rest(&l, room, part_of) <= room->room + 1e-9);
+        }
+        cut += part > 0 && part < 1;
+        whole += part == 1;
+        stopped += part == 0;
+        if (part > 0 && part < 1)
+            assert_near(tightest, 0, 1e-12);
+        else if (part == 0)
+            assert_true(tightest <= 0);
+        else
+            assert_true(tightest >= -1e-12);
+    }
+    assert_true(cut > 300 && whole > 300 && stopped > 300);
+}
+
+// What does not close in asks for no room, not even inside it.
+static void leaving_is_free(void **state)
+{
+    (void)state;
+    const struct lw_limits l = limits(8);
+    static struct lw_rooms rooms = {.count = 1, .room = {{.gradient = {1}, .room = -0.05, .approach = 1}}};
+    const double away[LW_NJ] = {2, -3, 1, 0, 0, 0}, along[LW_NJ] = {0, 3, 0, 0, 0, 0}, towards[LW_NJ] = {-1e-9};
+    assert_near(lw_clearance_part(&l, period_s, &rooms, away), 1, 0);
+    assert_near(lw_clearance_part(&l, period_s, &rooms, along), 1, 0);
+    assert_near(lw_clearance_part(&l, period_s, &rooms, towards), 0, 0);
+}
+
+// An axis that is driven at a wall by any wishes never comes nearer than it may, and when it is driven on it comes as
+// near as that.
+static void a_wall_is_never_reached_and_always_approached(void **state)
+{
+    (void)state;
+    struct random random = {72};
+    static struct lw_rooms rooms = {.count = 1};
+    for (int n = 0; n < 200; n++) {
+        const struct lw_limits l = limits(random_in(&random, 2, 30));
+        double q[LW_NJ] = {0}, velocity[LW_NJ] = {0}, command[LW_NJ];
+        const double wall = 0.7;
+        unsigned seen = 0;
+        for (int k = 0; k < 3000; k++) {
+            double wish[LW_NJ] = {0};
+            random_fill(&random, -2, 2, wish, LW_NJ);
+            wish[0] = k < 1500 ? random_in(&random, -1, 3) : 3;
+            rooms.room[0] = (struct lw_room){.gradient = {-1}, .room = wall - q[0] - l.clearance};
+            const struct lw_guard_input in = {
+                .limits = &l, .period_s = period_s, .q = q, .velocity = velocity, .wish = wish};
+            seen |= lw_clearance_command(&in, &rooms, command);
+            for (int j = 0; j < LW_NJ; j++) {
+                assert_true(fabs(command[j] - velocity[j]) <= l.acceleration[j] * period_s + 1e-12);
+                q[j] += j == 0 ? period_s * command[j] : 0;
+            }
+            memcpy(velocity, command, sizeof velocity);
+            assert_true(wall - q[0] >= l.clearance - 1e-12);
+        }
+        assert_true(seen & LW_LIMIT_CLEARANCE);
+        assert_near(wall - q[0], l.clearance, 2e-3);
+    }
+}
+
+// Without rooms it is the guard alone, bit for bit; with a wish that is no number too.
+static void without_rooms_nothing_changes(void **state)
+{
+    (void)state;
+    struct random random = {73};
+    static struct lw_rooms rooms = {.count = 0};
+    for (int n = 0; n < 500; n++) {
+        const struct lw_limits l = limits(8);
+        double q[LW_NJ], velocity[LW_NJ], wish[LW_NJ], one[LW_NJ], two[LW_NJ];
+        random_fill(&random, -6, 6, q, LW_NJ);
+        random_fill(&random, -2, 2, velocity, LW_NJ);
+        random_fill(&random, -4, 4, wish, LW_NJ);
+        if (n % 10 == 0)
+            wish[n % LW_NJ] = (double)NAN;
+        const struct lw_guard_input in = {
+            .limits = &l, .period_s = period_s, .q = q, .velocity = velocity, .wish = wish};
+        assert_int_equal(lw_clearance_command(&in, &rooms, one), lw_guard_shape(&in, two));
+        assert_same_bits(one, two, sizeof one);
+    }
+}
+
+// A wish that turns aside at full speed is not followed where the acceleration limits would carry the arm on into the
+// wall: it brakes along its way first.
+static void acceleration_limits_do_not_carry_it_into_the_wall(void **state)
+{
+    (void)state;
+    const struct lw_limits l = limits(8);
+    static struct lw_rooms rooms = {.count = 1};
+    // At 2 rad/s braking takes 0.25 s and 0.25 m, and the tick's own way.
+    rooms.room[0] = (struct lw_room){.gradient = {-1}, .room = 0.25};
+    const double q[LW_NJ] = {0}, velocity[LW_NJ] = {2}, wish[LW_NJ] = {0, 3, 3, 3, 3, 3};
+    double command[LW_NJ];
+    const struct lw_guard_input in = {.limits = &l, .period_s = period_s, .q = q, .velocity = velocity, .wish = wish};
+    assert_true(lw_clearance_command(&in, &rooms, command) & LW_LIMIT_CLEARANCE);
+    const double expected[LW_NJ] = {2 - 8 * period_s};
+    for (int j = 0; j < LW_NJ; j++)
+        assert_near(command[j], expected[j], 1e-12);
+}
+
+// The reach covers every room that could cut the fastest motion possible in the next tick.
+static void the_reach_covers_what_could_matter(void **state)
+{
+    (void)state;
+    struct random random = {74};
+    for (int n = 0; n < 2000; n++) {
+        const struct lw_limits l = limits(random_in(&random, 1, 30));
+        const double obstacle = random_in(&random, 0, 1);
+        double velocity[LW_NJ], next[LW_NJ];
+        random_fill(&random, -2, 2, velocity, LW_NJ);
+        for (int j = 0; j < LW_NJ; j++)
+            next[j] = fmin(fabs(velocity[j]) + l.acceleration[j] * period_s, l.velocity[j]);
+        const double reach = lw_clearance_reach(&l, period_s, velocity, obstacle);
+        static struct lw_rooms rooms = {.count = 1};
+        rooms.room[0].room = reach - l.clearance;
+        rooms.room[0].approach = obstacle;
+        for (int j = 0; j < LW_NJ; j++)
+            rooms.room[0].gradient[j] = -1.6;
+        assert_near(lw_clearance_part(&l, period_s, &rooms, next), 1, 1e-12);
+    }
+    struct lw_limits off = limits(8);
+    off.clearance = HUGE_VAL;
+    const double velocity[LW_NJ] = {1};
+    assert_near(lw_clearance_reach(&off, period_s, velocity, 1), 0, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_part_is_the_largest_that_can_be_braked),
+                                       cmocka_unit_test(leaving_is_free),
+                                       cmocka_unit_test(a_wall_is_never_reached_and_always_approached),
+                                       cmocka_unit_test(without_rooms_nothing_changes),
+                                       cmocka_unit_test(acceleration_limits_do_not_carry_it_into_the_wall),
+                                       cmocka_unit_test(the_reach_covers_what_could_matter)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
