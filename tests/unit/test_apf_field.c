@@ -173,7 +173,7 @@ static void check_kind(enum lw_shape_kind kind, uint64_t seed)
         int seen = 0;
         lw_body_make(LW_UR5, (enum lw_body_model)model, NULL, &body);
         for (int n = 0; n < 400 && seen < CONFIGURATIONS; n++) {
-            const struct lw_law_params law = params(1 + (int)random_below(&random, 2));
+            const struct lw_law_params law = params(1 + random_below(&random, 2));
             double q[LW_NJ];
             random_fill(&random, -3, 3, q, LW_NJ);
             random_world(&random, kind);

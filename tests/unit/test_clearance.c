@@ -45,8 +45,8 @@ static double way_until_rest(const struct lw_limits *l, const struct lw_room *ro
         time = fmax(time, fabs(velocity[j]) / l->acceleration[j]);
         closing -= room->gradient[j] * velocity[j];
     }
-    for (double t = 0; t < time; t += period_s)
-        way += period_s * (closing * fmax(1 - t / time, 0) + room->approach);
+    for (int k = 0; k * period_s < time; k++)
+        way += period_s * (closing * (1 - k * period_s / time) + room->approach);
     return way;
 }
 
@@ -67,7 +67,7 @@ static void the_part_is_the_largest_that_can_be_braked(void **state)
     int cut = 0, whole = 0, stopped = 0;
     for (int n = 0; n < 5000; n++) {
         const struct lw_limits l = limits(random_in(&random, 2, 20));
-        const struct lw_rooms *rooms = random_rooms(&random, 1 + (int)random_below(&random, 6), 0.6);
+        const struct lw_rooms *rooms = random_rooms(&random, 1 + random_below(&random, 6), 0.6);
         double velocity[LW_NJ], part_of[LW_NJ];
         random_fill(&random, -2, 2, velocity, LW_NJ);
         const double part = lw_clearance_part(&l, period_s, rooms, velocity);
