@@ -23,8 +23,11 @@ struct lw_cull lw_cull_link(const struct lw_capsule *link, double d_max)
         cull.e[k] = (float)(length > 0 ? axis[k] / length : 0);
         size += fabs(link->a[k]) + fabs(link->b[k]);
     }
+    // Rounding moves the axis by less than 4e-7 of its coordinates. The squared distance of a sphere has an error of
+    // 5e-7 (half + distance)^2, which 1e-3 half in lw_cull_look and the 1e-6 in all radii outweigh.
     cull.half = (float)(0.5 * length);
-    // Rounding moves the axis by less than 4e-7 of its coordinates.
+    for (int k = 0; k < 3; k++)
+        cull.side[k] = (float)(0.5 * fabs(axis[k]) * (1 + 1e-6));
     cull.thick = (float)(link->r * (1 + 1e-6) + 4e-7 * size);
     lw_cull_look(&cull, d_max);
     return cull;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Broad phase: which of sixteen bounding spheres a link may be near to, in single precision, four at once. It errs on
-// the near side alone, and what is not a number is near.
+// Broad phase: which of sixteen boxes or bounding spheres a link may be near to, in single precision, four at once. It
+// errs on the near side alone, and what is not a number is near.
 //
 // Units    metres.
 // Frames   base frame.
@@ -16,16 +16,21 @@
 #include <stdint.h> // int32_t
 #include <string.h> // memcpy
 
-// Pointers to the first of sixteen spheres.
-struct lw_sixteen {
+// Pointers to the first of sixteen.
+struct lw_spheres {
     const float *x, *y, *z, *r;
+};
+struct lw_boxes {
+    const float *x, *y, *z, *half[3];
+    const float *slack; // m, how far their members may have moved
 };
 
 // A link as its middle, unit axis and half length, and how far it looks.
 struct lw_cull {
     float m[3], e[3], half;
-    float thick; // its radius, rounded up
-    float reach; // thick and the distance that counts as near
+    float side[3]; // half sides of the box around its axis
+    float thick;   // its radius, rounded up
+    float reach;   // thick and the distance that counts as near
 };
 
 typedef float lw_four __attribute__((vector_size(16)));
@@ -37,7 +42,16 @@ struct lw_cull lw_cull_link(const struct lw_capsule *link, double d_max);
 // Sets the distance that counts as near.
 static inline void lw_cull_look(struct lw_cull *link, double d_max)
 {
-    link->reach = (float)(((double)link->thick + d_max) * (1 + 1e-6) + 1e-5);
+    link->reach = (float)(((double)link->thick + d_max) * (1 + 1e-6) + 1e-5 + 1e-3 * (double)link->half);
+}
+
+// Index of the least of some values.
+static inline int lw_cull_least(const float *value, int count)
+{
+    int at = 0;
+    for (int i = 1; i < count; i++)
+        at = value[i] < value[at] ? i : at;
+    return at;
 }
 
 static inline lw_four lw_four_load(const float *from)
@@ -47,46 +61,90 @@ static inline lw_four lw_four_load(const float *from)
     return value;
 }
 
-static inline lw_four lw_four_choose(lw_four_mask which, lw_four yes, lw_four no)
+// The values above zero, 0 for the others and for what is not a number.
+static inline lw_four lw_four_positive(lw_four x)
 {
-    return (lw_four)((which & (lw_four_mask)yes) | (~which & (lw_four_mask)no));
+    const lw_four_mask above = x > 0;
+    return (lw_four)(above & (lw_four_mask)x);
 }
 
-// Squared distances of four centres from the link's axis.
-static inline lw_four lw_cull_squares(const struct lw_sixteen *s, int i, const struct lw_cull *link)
+static inline lw_four lw_four_abs(lw_four x)
 {
-    const lw_four half = {link->half, link->half, link->half, link->half};
-    const lw_four wx = lw_four_load(s->x + i) - link->m[0], wy = lw_four_load(s->y + i) - link->m[1],
-                  wz = lw_four_load(s->z + i) - link->m[2];
-    lw_four t = wx * link->e[0] + wy * link->e[1] + wz * link->e[2];
-    t = lw_four_choose(t > half, half, t);
-    t = lw_four_choose(t < -half, -half, t);
-    const lw_four vx = wx - t * link->e[0], vy = wy - t * link->e[1], vz = wz - t * link->e[2];
-    return vx * vx + vy * vy + vz * vz;
+    return (lw_four)((lw_four_mask)x & INT32_MAX);
+}
+
+// Squared distances of four centres from the link's axis, by its middle: |w|^2 - t^2 + what t is beyond the ends,
+// squared. The digits lost are few beside reach (see lw_cull_link).
+static inline lw_four lw_cull_spheres_square(const struct lw_spheres *s, int i, const struct lw_cull *link)
+{
+    const lw_four x = lw_four_load(s->x + i) - link->m[0], y = lw_four_load(s->y + i) - link->m[1],
+                  z = lw_four_load(s->z + i) - link->m[2];
+    const lw_four t = x * link->e[0] + y * link->e[1] + z * link->e[2];
+    const lw_four beyond = lw_four_positive(lw_four_abs(t) - link->half);
+    return x * x + y * y + z * z - t * t + beyond * beyond;
+}
+
+// Squared distances of four boxes from the box around the link's axis.
+static inline lw_four lw_cull_boxes_square(const struct lw_boxes *b, int i, const struct lw_cull *link)
+{
+    const lw_four x = lw_four_abs(lw_four_load(b->x + i) - link->m[0]) - (lw_four_load(b->half[0] + i) + link->side[0]);
+    const lw_four y = lw_four_abs(lw_four_load(b->y + i) - link->m[1]) - (lw_four_load(b->half[1] + i) + link->side[1]);
+    const lw_four z = lw_four_abs(lw_four_load(b->z + i) - link->m[2]) - (lw_four_load(b->half[2] + i) + link->side[2]);
+    const lw_four beside[3] = {lw_four_positive(x), lw_four_positive(y), lw_four_positive(z)};
+    return beside[0] * beside[0] + beside[1] * beside[1] + beside[2] * beside[2];
+}
+
+// A bit each for the lanes i..i+3 that are within a distance.
+static inline lw_four_mask lw_cull_within(lw_four square, lw_four distance, int i)
+{
+    static const lw_four_mask bit = {1, 2, 4, 8};
+    return ~(square > distance * distance) & (bit << i);
+}
+
+static inline unsigned lw_cull_bits(lw_four_mask near)
+{
+    return (unsigned)(near[0] | near[1] | near[2] | near[3]);
 }
 
 // Bit i is set when sphere i may be near.
 //   slack  in  m, how far they may have moved
-static inline unsigned lw_cull_near(const struct lw_sixteen *s, const struct lw_cull *link, float slack)
+static inline unsigned lw_cull_spheres(const struct lw_spheres *s, const struct lw_cull *link, float slack)
 {
-    static const lw_four_mask bit = {1, 2, 4, 8};
-    const float reach = link->reach + slack;
     lw_four_mask near = {0, 0, 0, 0};
-    for (int i = 0; i < 16; i += 4) {
-        const lw_four radius = lw_four_load(s->r + i) + reach;
-        near |= ~(lw_cull_squares(s, i, link) > radius * radius) & (bit << i);
-    }
-    return (unsigned)(near[0] | near[1] | near[2] | near[3]);
+    for (int i = 0; i < 16; i += 4)
+        near |= lw_cull_within(lw_cull_spheres_square(s, i, link), lw_four_load(s->r + i) + (link->reach + slack), i);
+    return lw_cull_bits(near);
 }
 
-// Lower bounds of the sixteen distances; NaN where there is none.
-static inline void lw_cull_bounds(const struct lw_sixteen *s, const struct lw_cull *link, float bound[16])
+// Bit i is set when something in box i may be near.
+static inline unsigned lw_cull_boxes(const struct lw_boxes *b, const struct lw_cull *link)
 {
+    lw_four_mask near = {0, 0, 0, 0};
+    for (int i = 0; i < 16; i += 4)
+        near |= lw_cull_within(lw_cull_boxes_square(b, i, link), lw_four_load(b->slack + i) + link->reach, i);
+    return lw_cull_bits(near);
+}
+
+// Index of the sphere that is nearest of the first `count`, and of such a box, about.
+static inline int lw_cull_nearest_sphere(const struct lw_spheres *s, const struct lw_cull *link, int count)
+{
+    float distance[16];
     for (int i = 0; i < 16; i += 4) {
-        const lw_four square = lw_cull_squares(s, i, link);
-        for (int k = 0; k < 4; k++)
-            bound[i + k] = sqrtf(square[k]) * (1 - 1e-6F) - s->r[i + k] - link->thick - 1e-5F;
+        const lw_four square = lw_four_positive(lw_cull_spheres_square(s, i, link));
+        for (int k = i; k < i + 4; k++)
+            distance[k] = sqrtf(square[k - i]) - s->r[k];
     }
+    return lw_cull_least(distance, count);
+}
+
+static inline int lw_cull_nearest_box(const struct lw_boxes *b, const struct lw_cull *link, int count)
+{
+    float square[16];
+    for (int i = 0; i < 16; i += 4) {
+        const lw_four four = lw_cull_boxes_square(b, i, link);
+        memcpy(square + i, &four, sizeof four);
+    }
+    return lw_cull_least(square, count);
 }
 
 #endif

@@ -17,46 +17,87 @@
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
 
-// A query with what its time makes of the world: how far the members of each block may have moved.
+enum { BOXES = LW_WORLD_BLOCKS + LW_WORLD_GROUPS };
+
+// A query with what its time makes of the world: how far the members of each box may have moved.
 struct sweep {
     const struct lw_near_query *query;
-    struct lw_snapshot_blocks const *block;
-    float slack[LW_WORLD_BLOCKS];
-    float radius[LW_WORLD_BLOCKS]; // of the blocks, slack included
+    const float *slack;
+    float room[BOXES];
 };
 
 static void start(const struct lw_near_query *query, struct sweep *sweep)
 {
-    const struct lw_snapshot *world = query->world;
+    static const float still[BOXES];
+    const struct lw_snapshot_boxes *box = &query->world->box;
     sweep->query = query;
-    sweep->block = &world->block;
-    for (int i = 0; i < world->blocks; i++) {
-        const double age = lw_moving_age(world->block.time_ns[i], query->time_ns);
-        sweep->slack[i] = (float)(world->block.speed[i] * age * (1 + 1e-6));
-        sweep->radius[i] = world->block.r[i] + sweep->slack[i] * (1 + 1e-6F);
-    }
-    for (int i = world->blocks; i % LW_WORLD_BLOCK != 0; i++)
-        sweep->radius[i] = 0;
+    sweep->slack = still;
+    if (query->world->extrapolated == 0)
+        return;
+    for (int i = 0; i < BOXES; i++)
+        if (i < query->world->groups * LW_WORLD_BLOCK || i >= LW_WORLD_BLOCKS)
+            sweep->room[i] = (float)(box->speed[i] * lw_moving_age(box->time_ns[i], query->time_ns) * (1 + 1e-6));
+    sweep->slack = sweep->room;
 }
 
-static struct lw_sixteen blocks_at(const struct sweep *sweep, int i)
+static struct lw_boxes boxes_at(const struct sweep *sweep, int i)
 {
-    return (struct lw_sixteen){&sweep->block->x[i], &sweep->block->y[i], &sweep->block->z[i], &sweep->radius[i]};
+    const struct lw_snapshot_boxes *b = &sweep->query->world->box;
+    return (struct lw_boxes){
+        &b->x[i], &b->y[i], &b->z[i], {&b->half[0][i], &b->half[1][i], &b->half[2][i]}, &sweep->slack[i]};
 }
 
-static struct lw_sixteen spheres_at(const struct sweep *sweep, int block)
+static struct lw_spheres spheres_at(const struct sweep *sweep, int block)
 {
     const struct lw_snapshot_spheres *s = &sweep->query->world->sphere;
     const int i = block * LW_WORLD_BLOCK;
-    return (struct lw_sixteen){&s->x[i], &s->y[i], &s->z[i], &s->r[i]};
+    return (struct lw_spheres){&s->x[i], &s->y[i], &s->z[i], &s->r[i]};
+}
+
+// A walk over the blocks that may be near a link; it may look less far as the walk goes on.
+struct walk {
+    const struct sweep *sweep;
+    const struct lw_cull *link;
+    unsigned groups, blocks; // left to visit, of sixteen each
+    int first_group, first_block;
+};
+
+static struct walk walk_from(const struct sweep *sweep, const struct lw_cull *link)
+{
+    return (struct walk){.sweep = sweep, .link = link, .first_group = -LW_WORLD_BLOCK};
+}
+
+static int take_lowest(unsigned *bits)
+{
+    const int lowest = __builtin_ctz(*bits);
+    *bits &= *bits - 1;
+    return lowest;
+}
+
+// The next block, -1 at the end.
+static int next_block(struct walk *walk)
+{
+    const struct lw_snapshot *world = walk->sweep->query->world;
+    while (walk->blocks == 0) {
+        while (walk->groups == 0) {
+            walk->first_group += LW_WORLD_BLOCK;
+            if (walk->first_group >= world->groups)
+                return -1;
+            const struct lw_boxes groups = boxes_at(walk->sweep, LW_WORLD_BLOCKS + walk->first_group);
+            walk->groups = lw_cull_boxes(&groups, walk->link);
+        }
+        const int group = walk->first_group + take_lowest(&walk->groups);
+        if (group >= world->groups)
+            continue;
+        walk->first_block = group * LW_WORLD_BLOCK;
+        const struct lw_boxes blocks = boxes_at(walk->sweep, walk->first_block);
+        walk->blocks = lw_cull_boxes(&blocks, walk->link);
+    }
+    const int block = walk->first_block + take_lowest(&walk->blocks);
+    return block < world->blocks ? block : -1;
 }
 
 // --- one pair ---
-
-static struct lw_near none(int part, double d_max)
-{
-    return (struct lw_near){.distance = {.d = d_max, .flags = LW_DISTANCE_NO_NORMAL}, .part = part, .other = -1};
-}
 
 // Whether the bounding sphere of a shape is farther than d_max for certain.
 static bool beyond(const struct lw_capsule *capsule, const struct lw_shape *shape, double d_max)
@@ -160,9 +201,10 @@ static void list(const struct sweep *sweep, int part, int i, struct lw_near_list
 static void list_block(const struct sweep *sweep, int part, const struct lw_cull *link, int block,
                        struct lw_near_list *out)
 {
-    const struct lw_sixteen spheres = spheres_at(sweep, block);
-    for (unsigned near = lw_cull_near(&spheres, link, sweep->slack[block]); near != 0; near &= near - 1) {
-        const int i = block * LW_WORLD_BLOCK + __builtin_ctz(near);
+    const struct lw_spheres spheres = spheres_at(sweep, block);
+    unsigned near = lw_cull_spheres(&spheres, link, sweep->slack[block]);
+    while (near != 0) {
+        const int i = block * LW_WORLD_BLOCK + take_lowest(&near);
         if (i < sweep->query->world->bounded)
             list(sweep, part, i, out);
     }
@@ -170,21 +212,15 @@ static void list_block(const struct sweep *sweep, int part, const struct lw_cull
 
 void lw_near_range(const struct lw_near_query *query, struct lw_near_list *out)
 {
-    const struct lw_snapshot *world = query->world;
     struct sweep sweep;
     start(query, &sweep);
     out->count = out->needed = 0;
     for (int part = 0; part < query->body->count; part++) {
         const struct lw_cull link = lw_cull_link(&query->placed->capsule[part], query->d_max);
-        for (int first = 0; first < world->blocks; first += LW_WORLD_BLOCK) {
-            const struct lw_sixteen blocks = blocks_at(&sweep, first);
-            for (unsigned near = lw_cull_near(&blocks, &link, 0); near != 0; near &= near - 1) {
-                const int block = first + __builtin_ctz(near);
-                if (block < world->blocks)
-                    list_block(&sweep, part, &link, block, out);
-            }
-        }
-        for (int i = world->bounded; i < world->count; i++)
+        struct walk walk = walk_from(&sweep, &link);
+        for (int block = next_block(&walk); block >= 0; block = next_block(&walk))
+            list_block(&sweep, part, &link, block, out);
+        for (int i = query->world->bounded; i < query->world->count; i++)
             list(&sweep, part, i, out);
     }
 }
@@ -217,87 +253,108 @@ void lw_near_self(const struct lw_body *body, const struct lw_placed *placed, do
 
 // --- nearest ---
 
-// Takes obstacle i of the snapshot if it is nearer to the part than the best so far. Distances beyond that one are not
-// followed up, but equal ones are.
-static void improve(const struct sweep *sweep, int part, int i, struct lw_near *best)
+// A search for the nearest obstacle, of one part or of all.
+struct nearest {
+    struct lw_near best; // so far; obstacle 0: its d is where to look at most
+    int index;           // of its obstacle
+};
+
+static struct nearest nothing(int part, double d_max)
+{
+    return (struct nearest){
+        .best = {.distance = {.d = d_max, .flags = LW_DISTANCE_NO_NORMAL}, .part = part, .other = -1}};
+}
+
+// Of equally near pairs the first part's, and of one part's the one with the lowest id.
+static bool comes_first(const struct lw_near *found, const struct lw_near *best)
+{
+    if (best->obstacle == 0 || found->part != best->part)
+        return best->obstacle == 0 || found->part < best->part;
+    return found->obstacle < best->obstacle;
+}
+
+// Takes obstacle i of the snapshot if it is nearer to the part than the best so far; returns whether it was. Distances
+// beyond that one are not followed up, but equal ones are.
+static bool improve(const struct sweep *sweep, int part, int i, struct nearest *nearest)
 {
     struct lw_near found;
-    const double bound = best->distance.d;
+    const double bound = nearest->best.distance.d;
     if (!measure(sweep->query, part, i, bound + 1e-9, &found))
-        return;
+        return false;
     const double d = found.distance.d;
-    const bool equal = d == bound && (best->obstacle == 0 || (best->part == part && found.obstacle < best->obstacle));
-    if (d < bound || equal || isnan(d))
-        *best = found;
+    if (!(d < bound) && !(d == bound && comes_first(&found, &nearest->best)) && !isnan(d))
+        return false;
+    nearest->best = found;
+    nearest->index = i;
+    return true;
 }
 
-// Index of the least of sixteen bounds, of the ones that are not numbers the first.
-static int least(const float bound[16], int count)
+// Starts from what was nearest last time; returns whether it is still there.
+static bool improve_by_last(const struct sweep *sweep, const struct lw_warm_pair *last, struct nearest *nearest)
 {
-    int at = 0;
-    for (int i = 0; i < count; i++) {
-        if (isnan(bound[i]))
-            return i;
-        at = bound[i] < bound[at] ? i : at;
-    }
-    return at;
+    const struct lw_snapshot *world = sweep->query->world;
+    if (last == NULL || last->id <= 0 || last->part < 0 || last->part >= sweep->query->body->count || last->index < 0 ||
+        last->index >= world->count || world->item[last->index].shape.id != (uint32_t)last->id)
+        return false;
+    return improve(sweep, last->part, last->index, nearest);
 }
 
-// The obstacle of the least lower bound in the block of the least lower bound, -1 = there is none: a first guess.
+static void keep_for_next(const struct nearest *nearest, struct lw_warm_pair *last)
+{
+    if (last != NULL)
+        *last = (struct lw_warm_pair){nearest->best.part, nearest->index, nearest->best.obstacle};
+}
+
+static int lesser(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+// An obstacle that is likely to be near: of the nearest box of the nearest group the nearest one. -1 = there is none.
 static int guess(const struct sweep *sweep, const struct lw_cull *link)
 {
     const struct lw_snapshot *world = sweep->query->world;
-    float bound[LW_WORLD_BLOCK], lowest = INFINITY;
-    int best = -1;
-    for (int first = 0; first < world->blocks; first += LW_WORLD_BLOCK) {
-        const struct lw_sixteen blocks = blocks_at(sweep, first);
-        const int left = world->blocks - first;
-        lw_cull_bounds(&blocks, link, bound);
-        const int at = least(bound, left < LW_WORLD_BLOCK ? left : LW_WORLD_BLOCK);
-        if (best < 0 || !(bound[at] >= lowest)) {
-            lowest = bound[at];
-            best = first + at;
-        }
-    }
-    if (best < 0)
+    if (world->bounded == 0)
         return -1;
-    const struct lw_sixteen spheres = spheres_at(sweep, best);
-    const int left = world->bounded - best * LW_WORLD_BLOCK;
-    lw_cull_bounds(&spheres, link, bound);
-    return best * LW_WORLD_BLOCK + least(bound, left < LW_WORLD_BLOCK ? left : LW_WORLD_BLOCK);
+    const struct lw_boxes groups = boxes_at(sweep, LW_WORLD_BLOCKS);
+    const int group = lw_cull_nearest_box(&groups, link, lesser(world->groups, LW_WORLD_BLOCK)) * LW_WORLD_BLOCK;
+    const struct lw_boxes blocks = boxes_at(sweep, group);
+    const int block = group + lw_cull_nearest_box(&blocks, link, lesser(world->blocks - group, LW_WORLD_BLOCK));
+    const struct lw_spheres spheres = spheres_at(sweep, block);
+    const int first = block * LW_WORLD_BLOCK;
+    return first + lw_cull_nearest_sphere(&spheres, link, lesser(world->bounded - first, LW_WORLD_BLOCK));
 }
 
-static void search_block(const struct sweep *sweep, struct lw_cull *link, int block, int measured, struct lw_near *best,
-                         int part)
+static void search_block(const struct sweep *sweep, int part, struct lw_cull *link, int block, struct nearest *nearest)
 {
-    const struct lw_sixteen spheres = spheres_at(sweep, block);
-    for (unsigned near = lw_cull_near(&spheres, link, sweep->slack[block]); near != 0; near &= near - 1) {
-        const int i = block * LW_WORLD_BLOCK + __builtin_ctz(near);
-        if (i < sweep->query->world->bounded && i != measured)
-            improve(sweep, part, i, best);
+    const struct lw_spheres spheres = spheres_at(sweep, block);
+    const int first = block * LW_WORLD_BLOCK, known = nearest->best.part == part ? nearest->index : -1;
+    unsigned near = lw_cull_spheres(&spheres, link, sweep->slack[block]);
+    while (near != 0) {
+        const int i = first + take_lowest(&near);
+        if (i >= sweep->query->world->bounded || i == known || !improve(sweep, part, i, nearest))
+            continue;
+        // Nothing beyond the new best is worth a look.
+        lw_cull_look(link, nearest->best.distance.d);
+        near &= lw_cull_spheres(&spheres, link, sweep->slack[block]);
     }
-    lw_cull_look(link, best->distance.d);
 }
 
 // Branch and bound over the obstacles of one part.
-static void search(const struct sweep *sweep, int part, struct lw_near *best)
+//   seeded  in  whether the best so far is a good one
+static void search(const struct sweep *sweep, int part, bool seeded, struct nearest *nearest)
 {
     const struct lw_snapshot *world = sweep->query->world;
-    struct lw_cull link = lw_cull_link(&sweep->query->placed->capsule[part], best->distance.d);
+    struct lw_cull link = lw_cull_link(&sweep->query->placed->capsule[part], nearest->best.distance.d);
     for (int i = world->bounded; i < world->count; i++)
-        improve(sweep, part, i, best);
-    const int first_guess = guess(sweep, &link);
-    if (first_guess >= 0)
-        improve(sweep, part, first_guess, best);
-    lw_cull_look(&link, best->distance.d);
-    for (int first = 0; first < world->blocks; first += LW_WORLD_BLOCK) {
-        const struct lw_sixteen blocks = blocks_at(sweep, first);
-        for (unsigned near = lw_cull_near(&blocks, &link, 0); near != 0; near &= near - 1) {
-            const int block = first + __builtin_ctz(near);
-            if (block < world->blocks)
-                search_block(sweep, &link, block, first_guess, best, part);
-        }
-    }
+        (void)improve(sweep, part, i, nearest);
+    const int seed = seeded ? -1 : guess(sweep, &link);
+    if (seed >= 0)
+        (void)improve(sweep, part, seed, nearest);
+    lw_cull_look(&link, nearest->best.distance.d);
+    struct walk walk = walk_from(sweep, &link);
+    for (int block = next_block(&walk); block >= 0; block = next_block(&walk))
+        search_block(sweep, part, &link, block, nearest);
 }
 
 void lw_near_each(const struct lw_near_query *query, struct lw_near out[LW_BODY_MAX])
@@ -305,16 +362,23 @@ void lw_near_each(const struct lw_near_query *query, struct lw_near out[LW_BODY_
     struct sweep sweep;
     start(query, &sweep);
     for (int part = 0; part < query->body->count; part++) {
-        out[part] = none(part, query->d_max);
-        search(&sweep, part, &out[part]);
+        struct lw_warm_pair *last = query->warm != NULL ? &query->warm->each[part] : NULL;
+        struct nearest nearest = nothing(part, query->d_max);
+        search(&sweep, part, improve_by_last(&sweep, last, &nearest), &nearest);
+        keep_for_next(&nearest, last);
+        out[part] = nearest.best;
     }
 }
 
 void lw_near_smallest(const struct lw_near_query *query, struct lw_near *out)
 {
+    struct lw_warm_pair *last = query->warm != NULL ? &query->warm->smallest : NULL;
+    struct nearest nearest = nothing(0, query->d_max);
     struct sweep sweep;
     start(query, &sweep);
-    *out = none(0, query->d_max);
+    bool seeded = improve_by_last(&sweep, last, &nearest);
     for (int part = 0; part < query->body->count; part++)
-        search(&sweep, part, out);
+        search(&sweep, part, seeded, &nearest);
+    keep_for_next(&nearest, last);
+    *out = nearest.best;
 }

@@ -34,11 +34,17 @@ struct lw_near_list {
     struct lw_near pair[LW_NEAR_MAX];
 };
 
-// Where the searches of hulls ended, by part and id & (LW_WARM_SLOTS - 1). All zero = nowhere. Two obstacles in one
-// place cost time only. Results of a warm search may differ from those of a cold one in the last bits: it belongs to
-// the state that a replay starts from.
+// A nearest pair: the obstacle's index, as long as it is the one with that id. All zero = none.
+struct lw_warm_pair {
+    int part, index, id;
+};
+
+// Where the searches of hulls ended, by part and id & (LW_WARM_SLOTS - 1), and what was nearest last time. All zero =
+// nowhere. Two obstacles in one place, or a new order of the snapshot, cost time only. Results of a warm search may
+// differ from those of a cold one in the last bits: it belongs to the state that a replay starts from.
 struct lw_warm_table {
     struct lw_warm entry[LW_BODY_MAX][LW_WARM_SLOTS];
+    struct lw_warm_pair each[LW_BODY_MAX], smallest;
 };
 
 // Moving obstacles are where they will be at time_ns: their age is time_ns - motion.time_ns within 0 and 0.5 s. Expired

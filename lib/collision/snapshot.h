@@ -16,9 +16,11 @@
 
 #include <stdint.h> // int64_t
 
-// Obstacles, vertices (padded) of all hulls, obstacles of a block, and how many blocks are looked at at once.
-enum { LW_WORLD_MAX = 10000, LW_WORLD_VERTICES = 1 << 18, LW_WORLD_BLOCK = 16 };
-enum { LW_WORLD_BLOCKS = (LW_WORLD_MAX / LW_WORLD_BLOCK / LW_WORLD_BLOCK + 1) * LW_WORLD_BLOCK };
+// Obstacles, and vertices (padded) of all their hulls.
+enum { LW_WORLD_MAX = 10000, LW_WORLD_VERTICES = 1 << 18 };
+
+// Obstacles of a block, which are looked at together; blocks and groups of blocks, both filled up to whole ones.
+enum { LW_WORLD_BLOCK = 16, LW_WORLD_BLOCKS = 640, LW_WORLD_GROUPS = 48 };
 
 // How an obstacle moves on from the pose it was told with.
 struct lw_motion {
@@ -39,14 +41,17 @@ struct lw_snapshot_item {
     struct lw_motion motion;
 };
 
-// Bounding spheres, rounded up so that single precision loses none.
+// Bounding spheres of obstacles, rounded up so that single precision loses none.
 struct lw_snapshot_spheres {
     float x[LW_WORLD_MAX], y[LW_WORLD_MAX], z[LW_WORLD_MAX], r[LW_WORLD_MAX];
 };
-struct lw_snapshot_blocks {
-    float x[LW_WORLD_BLOCKS], y[LW_WORLD_BLOCKS], z[LW_WORLD_BLOCKS], r[LW_WORLD_BLOCKS];
-    double speed[LW_WORLD_BLOCKS];    // m/s, of the fastest extrapolated one
-    int64_t time_ns[LW_WORLD_BLOCKS]; // of the extrapolated one that was seen first
+
+// Bounding boxes along the axes, half[k] in x y z, rounded up as well: blocks first, groups from LW_WORLD_BLOCKS on.
+struct lw_snapshot_boxes {
+    float x[LW_WORLD_BLOCKS + LW_WORLD_GROUPS], y[LW_WORLD_BLOCKS + LW_WORLD_GROUPS];
+    float z[LW_WORLD_BLOCKS + LW_WORLD_GROUPS], half[3][LW_WORLD_BLOCKS + LW_WORLD_GROUPS];
+    double speed[LW_WORLD_BLOCKS + LW_WORLD_GROUPS];    // m/s, of the fastest extrapolated obstacle
+    int64_t time_ns[LW_WORLD_BLOCKS + LW_WORLD_GROUPS]; // of the extrapolated one that was seen first
 };
 
 // Used while it is built.
@@ -64,7 +69,8 @@ struct lw_snapshot {
 
     int count;        // obstacles
     int bounded;      // of them stand first, in Morton order and by id; half-spaces follow, by id
-    int blocks;       // of bounded ones
+    int blocks;       // of bounded ones, 16 each
+    int groups;       // of blocks, 16 each
     int extrapolated; // obstacles
     int expiring;     // obstacles
     int vertices;     // places taken in the arena
@@ -72,7 +78,7 @@ struct lw_snapshot {
 
     struct lw_snapshot_item item[LW_WORLD_MAX];
     struct lw_snapshot_spheres sphere;
-    struct lw_snapshot_blocks block;
+    struct lw_snapshot_boxes box;
     int64_t expiry[LW_WORLD_MAX]; // ns, of the expiring ones, ascending
     struct lw_snapshot_order order[2][LW_WORLD_MAX];
     double arena[3 * LW_WORLD_VERTICES];

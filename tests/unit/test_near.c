@@ -75,7 +75,7 @@ static void every_number_of_obstacles(void **state)
     (void)state;
     static const int counts[] = {0, 1, 2, 15, 16, 17, 33, 255, 256, 257, 1000, 3000};
     for (size_t c = 0; c < sizeof counts / sizeof counts[0]; c++)
-        for (int tool = LW_TOOL_NONE; tool <= (int)LW_TOOL_HULL; tool++) {
+        for (int tool = LW_TOOL_NONE; tool <= LW_TOOL_HULL; tool++) {
             struct near_rig *rig = near_rig(7 + c);
             const struct lw_tool with = rig_tool(&rig->random, (enum lw_tool_kind)tool);
             lw_body_make(LW_UR10, LW_BODY_CAPSULES, &with, &rig->body);
