@@ -7,13 +7,14 @@
 // Arrays   PAIRS pairs of a kind, 2 to 50 cm apart, in a cube of 2 m.
 // Memory   static.
 // Errors   exit status 0 ok, 1 failed, 2 usage.
-#include <algorithm> // sort
+#include "measure.hpp"
+
+#include <algorithm> // max
 #include <array>
 #include <cmath> // sqrt
 #include <cstdint>
 #include <cstdio>  // printf
 #include <cstdlib> // strtol
-#include <ctime>   // clock_gettime
 #include <memory>
 #include <vector>
 
@@ -32,30 +33,6 @@ namespace
 {
 
 constexpr int PAIRS = 200;
-
-// xorshift64*, the same sequence in every run.
-uint64_t state = 1;
-
-// Uniform in [-1, 1).
-double uniform()
-{
-    state ^= state >> 12;
-    state ^= state << 25;
-    state ^= state >> 27;
-    return static_cast<double>((state * UINT64_C(2685821657736338717)) >> 11) * 0x1p-52 - 1;
-}
-
-double unit(double *v, int n)
-{
-    double square = 0;
-    for (int i = 0; i < n; i++) {
-        v[i] = uniform();
-        square += v[i] * v[i];
-    }
-    for (int i = 0; i < n; i++)
-        v[i] /= std::sqrt(square);
-    return square;
-}
 
 struct contest {
     const char *name;
@@ -121,13 +98,6 @@ bool make(const contest &c, pair &p, uint32_t id)
     lw_distance found;
     lw_distance_link(&p.link, &p.shape, INFINITY, nullptr, &found);
     return found.d > 0.02 && found.d < 0.5;
-}
-
-double now_ns()
-{
-    timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e9 * static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_nsec);
 }
 
 // --- ours ---
@@ -238,12 +208,6 @@ template <typename Query> double block(Query query, bool warm)
     for (size_t i = 0; i < PAIRS; i++)
         query(pairs()[i], warm);
     return (now_ns() - start) / PAIRS;
-}
-
-double median(std::vector<double> values)
-{
-    std::sort(values.begin(), values.end());
-    return values[values.size() / 2];
 }
 
 void print_contest(const contest &c, int blocks, bool last)
