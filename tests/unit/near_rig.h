@@ -153,4 +153,21 @@ static inline struct lw_near_query rig_query(struct near_rig *rig, int64_t time_
                                   .warm = &rig->warm};
 }
 
+// --- every pair, one by one ---
+
+// Distance of a part to obstacle i where it was told to be.
+static inline struct lw_distance rig_distance(const struct near_rig *rig, const struct lw_snapshot *world, int part,
+                                              int i)
+{
+    const struct lw_shape shape = lw_snapshot_shape(world, i);
+    struct lw_distance found;
+    if (part == rig->body.tool_part && rig->body.tool.kind == LW_TOOL_HULL) {
+        const struct lw_shape tool = lw_body_tool_shape(&rig->body, &rig->placed);
+        assert_int_equal(lw_distance_shapes(&tool, &shape, &found), LW_OK);
+    } else {
+        lw_distance_link(&rig->placed.capsule[part], &shape, (double)INFINITY, NULL, &found);
+    }
+    return found;
+}
+
 #endif
