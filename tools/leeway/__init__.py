@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from leeway._native import BUILD
     from leeway.arm import Arm
+    from leeway.clearance import clearance
     from leeway.logs.log import read_log
     from leeway.scene import Run, Scene, load_scene, simulate
     from leeway.shapes import Box, Capsule, Distance, HalfSpace, Hull, Shape, Sphere, distance
@@ -31,6 +32,7 @@ __all__ = [
     "Scene",
     "Shape",
     "Sphere",
+    "clearance",
     "distance",
     "load_scene",
     "read_log",
@@ -41,6 +43,7 @@ __all__ = [
 _HOMES = {
     "leeway._native": ("BUILD",),
     "leeway.arm": ("Arm",),
+    "leeway.clearance": ("clearance",),
     "leeway.logs.log": ("read_log",),
     "leeway.scene": ("Run", "Scene", "load_scene", "simulate"),
     "leeway.shapes": (

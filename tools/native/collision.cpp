@@ -25,40 +25,27 @@ extern "C" {
 
 namespace nb = nanobind;
 
-namespace
+lw_pose to_pose(const double *matrix)
 {
-
-// A solid with the memory of its vertices.
-struct Shape {
-    std::vector<double> vertices;
-    lw_solid data{};
-
-    lw_solid solid() const
-    {
-        lw_solid out = data;
-        out.vertex = vertices.data();
-        return out;
+    lw_pose pose;
+    for (int row = 0; row < 3; row++) {
+        std::copy(matrix + 4 * row, matrix + 4 * row + 3, pose.r + 3 * row);
+        pose.p[row] = matrix[4 * row + 3];
     }
-};
+    return pose;
+}
 
-// A shape in a place, with the memory of its vertices there.
-struct Placed {
-    double room[LW_HULL_ROOM];
-    lw_shape shape;
-};
-
-void place(const Shape &shape, const double *pose, Placed &placed)
+void place(const Shape &shape, const double *matrix, Placed &placed)
 {
     const lw_solid solid = shape.solid();
+    const lw_pose pose = to_pose(matrix);
     const char *reason = nullptr;
-    lw_pose frame;
-    for (int row = 0; row < 3; row++) {
-        std::copy(pose + 4 * row, pose + 4 * row + 3, frame.r + 3 * row);
-        frame.p[row] = pose[4 * row + 3];
-    }
-    if (lw_shape_make(&solid, &frame, placed.room, &placed.shape, &reason) != LW_OK)
+    if (lw_shape_make(&solid, &pose, placed.room, &placed.shape, &reason) != LW_OK)
         throw std::invalid_argument(reason);
 }
+
+namespace
+{
 
 // Refuses at once what no pose can mend.
 Shape check(Shape shape)

@@ -7,7 +7,7 @@
 // Memory   results are owned by Python.
 // Errors   ValueError with the C code's text.
 #include "arrays.hpp"    // Input, Output, Owned
-#include "collision.hpp" // bind_collision
+#include "collision.hpp" // bind_collision, bind_clearance
 #include "replay.hpp"    // bind_replay
 #include "scene.hpp"     // Scene
 
@@ -167,6 +167,7 @@ NB_MODULE(_native, m)
           "Reads a scene from YAML text; sets is a list of \"key=value\".");
     m.def("describe_scene", &describe_scene, "Reference of all keys of a scene, for people.");
     bind_collision(m);
+    bind_clearance(m);
     m.def("simulate", &simulate, nb::arg("scene"), "Runs a scene in process; arrays by name.");
     bind_replay(m);
 }
