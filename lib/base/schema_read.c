@@ -8,12 +8,11 @@
 // Errors   the first problem found is reported and ends the reading.
 #include "base/schema.h"
 
-#include "base/yaml_tree.h" // struct lw_tree, lw_tree_*
+#include "base/schema_values.h" // lw_value_*
+#include "base/yaml_tree.h"     // struct lw_tree, lw_tree_*
 
-#include <errno.h>  // errno
-#include <math.h>   // isfinite, HUGE_VAL
 #include <stdarg.h> // va_list
-#include <stdlib.h> // strtod, malloc
+#include <stdlib.h> // malloc
 #include <string.h> // memcpy, strcmp
 
 enum { PATH_MAX_LENGTH = 128 };
@@ -22,6 +21,7 @@ struct reader {
     const struct lw_source *source;
     bool *set_used;
     char path[PATH_MAX_LENGTH]; // dotted path of the value being read
+    unsigned char *root;        // the struct that is filled
     struct lw_error *error;
 };
 
@@ -57,102 +57,14 @@ static enum lw_status refuse(struct reader *r, const struct value *at, const cha
     return LW_E_SCENE;
 }
 
-// --- scalars ---
-
-// A decimal number, finite: no hexadecimal, no nan, no inf, nothing behind it.
-static bool parse_number(const yaml_node_t *node, double *number)
-{
-    const char *text = lw_tree_scalar(node);
-    if (text == NULL || text[0] == '\0' || text[strspn(text, "+-.0123456789eE")] != '\0')
-        return false;
-    char *end = NULL;
-    errno = 0;
-    *number = strtod(text, &end);
-    return *end == '\0' && end != text && isfinite(*number);
-}
-
-static bool in_range(const struct lw_key *key, double number)
-{
-    return number <= key->max && (key->above_min ? number > key->min : number >= key->min);
-}
-
-static bool read_number(const struct lw_key *key, const yaml_node_t *node, double *out)
-{
-    double number = 0;
-    if (!parse_number(node, &number) || !in_range(key, number))
-        return false;
-    *out = number;
-    return true;
-}
-
-static bool read_integer(const struct lw_key *key, const yaml_node_t *node, int *out)
-{
-    double number = 0;
-    if (!read_number(key, node, &number) || number != floor(number))
-        return false;
-    *out = (int)number;
-    return true;
-}
-
-static bool read_choice(const struct lw_key *key, const yaml_node_t *node, int *out)
-{
-    const char *text = lw_tree_scalar(node);
-    for (int i = 0; text != NULL && key->names[i] != NULL; i++)
-        if (strcmp(text, key->names[i]) == 0) {
-            *out = i;
-            return true;
-        }
-    return false;
-}
-
-// One entry of a vector or of limits; a limit may be off.
-static bool read_entry(const struct lw_key *key, const yaml_node_t *node, double *out)
-{
-    const char *text = lw_tree_scalar(node);
-    const bool off = key->kind == LW_LIMITS && text != NULL && strcmp(text, "off") == 0;
-    if (off)
-        *out = HUGE_VAL;
-    return off || read_number(key, node, out);
-}
-
-static bool read_vector(const struct lw_key *key, const struct value *v, double *out)
-{
-    if (lw_tree_length(v->node) != key->count)
-        return false;
-    for (int i = 0; i < key->count; i++)
-        if (!read_entry(key, lw_tree_item(v->tree, v->node, i), &out[i]))
-            return false;
-    return true;
-}
-
-static bool read_limits(const struct lw_key *key, const struct value *v, double *out)
-{
-    if (lw_tree_scalar(v->node) == NULL)
-        return read_vector(key, v, out);
-    double limit = 0;
-    if (!read_entry(key, v->node, &limit))
-        return false;
-    for (int i = 0; i < key->count; i++)
-        out[i] = limit;
-    return true;
-}
-
-// --- composites ---
-
+// Refuses a value that is not of its key's kind; in a list of the right length it names the entry that is wrong.
 static enum lw_status refuse_kind(struct reader *r, const struct value *at, const struct lw_key *key)
 {
     char expected[192], found[96];
     lw_schema_expected(key, expected, sizeof expected);
-    // In a list of the right length, name the entry that is wrong.
-    const yaml_node_t *wrong = at->node;
-    const bool is_vector = key->kind == LW_VECTOR || key->kind == LW_LIMITS;
-    for (int i = 0; is_vector && lw_tree_length(at->node) == key->count && i < key->count; i++) {
-        double number = 0;
-        wrong = lw_tree_item(at->tree, at->node, i);
-        if (!read_entry(key, wrong, &number))
-            break;
-    }
-    lw_tree_found(wrong, found, sizeof found);
+    const int length = key->kind == LW_ROWS ? key->width : key->count;
+    const bool has_entries = key->kind == LW_VECTOR || key->kind == LW_LIMITS || key->kind == LW_ROWS;
+    lw_tree_found(has_entries ? lw_value_wrong(key, at->tree, at->node, length) : at->node, found, sizeof found);
     return refuse(r, at, "expected %s, found %s", expected, found);
 }
 
@@ -171,6 +83,29 @@ static void path_pop(struct reader *r, size_t old)
     r->path[old] = '\0';
 }
 
+// Puts the rows of a list behind those already in their pool.
+static enum lw_status read_rows(struct reader *r, const struct lw_key *key, const struct value *v, struct lw_rows *out)
+{
+    const int count = lw_tree_length(v->node);
+    if (count < 0 || count > key->count)
+        return refuse_kind(r, v, key);
+    const struct lw_pool *pool = key->pool;
+    double *numbers = (double *)(void *)(r->root + pool->offset);
+    int used = 0;
+    memcpy(&used, r->root + pool->used_offset, sizeof used);
+    if (count * key->width > pool->capacity - used)
+        return refuse(r, v, "expected at most %d numbers in all lists of lists, found more", pool->capacity);
+    const struct lw_rows rows = {used, count};
+    for (int i = 0; i < count; i++, used += key->width) {
+        const struct value row = {v->tree, lw_tree_item(v->tree, v->node, i), v->set};
+        if (!lw_value_row(key, row.tree, row.node, &numbers[used]))
+            return refuse_kind(r, &row, key);
+    }
+    memcpy(r->root + pool->used_offset, &used, sizeof used);
+    *out = rows;
+    return LW_OK;
+}
+
 static enum lw_status read_list(struct reader *r, const struct lw_key *key, const struct value *v,
                                 unsigned char *parent)
 {
@@ -182,7 +117,11 @@ static enum lw_status read_list(struct reader *r, const struct lw_key *key, cons
         snprintf(index, sizeof index, "%d", i);
         const size_t old = path_push(r, index);
         const struct value item = {v->tree, lw_tree_item(v->tree, v->node, i), v->set};
-        enum lw_status status = read_mapping(r, key->keys, &item, parent + key->offset + (size_t)i * key->stride);
+        unsigned char *out = parent + key->offset + (size_t)i * key->stride;
+        const int line = v->set < 0 ? lw_tree_line(item.node) : 0;
+        if (key->line_offset != 0)
+            memcpy(out + key->line_offset, &line, sizeof line);
+        enum lw_status status = read_mapping(r, key->keys, &item, out);
         path_pop(r, old);
         if (status != LW_OK)
             return status;
@@ -197,11 +136,12 @@ static enum lw_status read_value(struct reader *r, const struct lw_key *key, con
     void *out = parent + key->offset;
     bool ok = false;
     switch (key->kind) {
-    case LW_NUMBER: ok = read_number(key, v->node, out); break;
-    case LW_INTEGER: ok = read_integer(key, v->node, out); break;
-    case LW_CHOICE: ok = read_choice(key, v->node, out); break;
-    case LW_VECTOR: ok = read_vector(key, v, out); break;
-    case LW_LIMITS: ok = read_limits(key, v, out); break;
+    case LW_NUMBER: ok = lw_value_number(key, v->node, out); break;
+    case LW_INTEGER: ok = lw_value_integer(key, v->node, out); break;
+    case LW_CHOICE: ok = lw_value_choice(key, v->node, out); break;
+    case LW_VECTOR: ok = lw_value_list(key, v->tree, v->node, key->count, out); break;
+    case LW_LIMITS: ok = lw_value_limits(key, v->tree, v->node, out); break;
+    case LW_ROWS: return read_rows(r, key, v, out);
     case LW_SECTION: return read_mapping(r, key->keys, v, out);
     case LW_LIST: return read_list(r, key, v, parent);
     }
@@ -237,12 +177,29 @@ static enum lw_status read_set(struct reader *r, const struct lw_key *key, int s
     return status;
 }
 
+// Refuses a key that is given although the choice before it has no such key.
+static enum lw_status check_absent(struct reader *r, const struct lw_key *key, const struct value *mapping,
+                                   const unsigned char *out, int set)
+{
+    const yaml_node_t *node = lw_tree_lookup(mapping->tree, mapping->node, key->name);
+    if (set < 0 && node == NULL)
+        return LW_OK;
+    const struct value at = {mapping->tree, node, set >= 0 ? set : mapping->set};
+    char choices[160];
+    int found = 0;
+    lw_schema_choices(key, choices, sizeof choices);
+    memcpy(&found, out + key->choice->offset, sizeof found);
+    return refuse(r, &at, "expected this key with %s only, found %s", choices, key->choice->names[found]);
+}
+
 // Reads one key of a mapping from the override, else from the mapping, else leaves the default.
 static enum lw_status read_key(struct reader *r, const struct lw_key *key, const struct value *mapping,
                                unsigned char *out)
 {
     // A section is visited even when the file lacks it: an override may name a key inside.
     const int set = find_set(r);
+    if (!lw_schema_applies(key, out))
+        return check_absent(r, key, mapping, out, set);
     if (set >= 0)
         return read_set(r, key, set, out);
     const struct value v = {mapping->tree, lw_tree_lookup(mapping->tree, mapping->node, key->name), mapping->set};
@@ -339,7 +296,7 @@ enum lw_status lw_schema_read(const struct lw_key *keys, const struct lw_source 
     enum lw_status status = LW_E_IO;
     if (copy != NULL && used != NULL) {
         memcpy(copy, out, size);
-        struct reader r = {.source = source, .set_used = used, .error = error};
+        struct reader r = {.source = source, .set_used = used, .root = copy, .error = error};
         status = read_tree(&r, keys, &tree, copy);
     } else {
         snprintf(error->text, sizeof error->text, "%s: out of memory", source->name);

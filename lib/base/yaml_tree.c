@@ -13,7 +13,7 @@
 #include <string.h> // strlen, strcmp
 
 // libyaml's time grows with the square of the depth, and of the number of anchors: no text of ours needs more.
-enum { DEPTH_MAX = 16, NODES_MAX = 10000 };
+enum { DEPTH_MAX = 16, NODES_MAX = 20000 };
 
 // --- parse ---
 
@@ -37,7 +37,7 @@ static const char *find_excess(const struct shape *shape)
         return "expected one YAML document, found more behind it";
     if (shape->depth > DEPTH_MAX)
         return "expected lists and mappings at most 16 deep";
-    return shape->nodes > NODES_MAX ? "expected at most 10000 values" : NULL;
+    return shape->nodes > NODES_MAX ? "expected at most 20000 values" : NULL;
 }
 
 static bool start(yaml_parser_t *parser, const char *text, char *problem, size_t size)

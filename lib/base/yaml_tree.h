@@ -17,7 +17,7 @@ struct lw_tree {
     yaml_document_t document;
 };
 
-// Parses a text that is one document, at most 16 deep and of at most 10000 values. On failure: false, `problem` says
+// Parses a text that is one document, at most 16 deep and of at most 20000 values. On failure: false, `problem` says
 // ":LINE: why", nothing to free.
 bool lw_tree_parse(struct lw_tree *tree, const char *text, char *problem, size_t size);
 void lw_tree_free(struct lw_tree *tree);

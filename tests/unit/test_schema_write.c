@@ -81,7 +81,7 @@ static void the_reference_mentions_every_key(void **state)
                               "section: keys with values\n    a section\n"
                               "  inner: a number > 0 (m)\n      a number in a section\n      default 0.25\n"
                               "items: a list of at most 3 entries\n    a list\n"
-                              "  id: an integer >= 0 and <= 9\n      number of an item\n"
+                              "  id: an integer >= 0 and <= 9\n      number of an item\n      default 0\n"
                               "  at: a list of 2 numbers >= -1 and <= 1\n      place of an item\n      required\n");
     free(text);
 }

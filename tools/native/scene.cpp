@@ -25,7 +25,8 @@ template <typename T> T load(const unsigned char *at)
     return value;
 }
 
-nb::dict section(const lw_key *keys, const unsigned char *at);
+// `root` is the whole scene, where the pool of numbers lies.
+nb::dict section(const lw_key *keys, const unsigned char *at, const unsigned char *root);
 
 nb::list numbers(const unsigned char *at, int count)
 {
@@ -35,16 +36,29 @@ nb::list numbers(const unsigned char *at, int count)
     return out;
 }
 
-nb::list items(const lw_key &key, const unsigned char *parent)
+nb::list rows(const lw_key &key, const unsigned char *at, const unsigned char *root)
+{
+    nb::list out;
+    const auto where = load<lw_rows>(at);
+    const unsigned char *row = root + key.pool->offset + static_cast<size_t>(where.first) * sizeof(double);
+    for (int i = 0; i < where.count; i++, row += static_cast<size_t>(key.width) * sizeof(double))
+        if (key.width == 1)
+            out.append(load<double>(row));
+        else
+            out.append(numbers(row, key.width));
+    return out;
+}
+
+nb::list items(const lw_key &key, const unsigned char *parent, const unsigned char *root)
 {
     nb::list out;
     const int count = load<int>(parent + key.count_offset);
     for (int i = 0; i < count; i++)
-        out.append(section(key.keys, parent + key.offset + static_cast<size_t>(i) * key.stride));
+        out.append(section(key.keys, parent + key.offset + static_cast<size_t>(i) * key.stride, root));
     return out;
 }
 
-nb::object value(const lw_key &key, const unsigned char *parent)
+nb::object value(const lw_key &key, const unsigned char *parent, const unsigned char *root)
 {
     const unsigned char *at = parent + key.offset;
     switch (key.kind) {
@@ -53,17 +67,19 @@ nb::object value(const lw_key &key, const unsigned char *parent)
     case LW_CHOICE: return nb::str(key.names[load<int>(at)]);
     case LW_VECTOR:
     case LW_LIMITS: return numbers(at, key.count);
-    case LW_SECTION: return section(key.keys, at);
-    case LW_LIST: return items(key, parent);
+    case LW_ROWS: return rows(key, at, root);
+    case LW_SECTION: return section(key.keys, at, root);
+    case LW_LIST: return items(key, parent, root);
     }
     return nb::none();
 }
 
-nb::dict section(const lw_key *keys, const unsigned char *at)
+nb::dict section(const lw_key *keys, const unsigned char *at, const unsigned char *root)
 {
     nb::dict out;
     for (; keys->name != nullptr; keys++)
-        out[keys->name] = value(*keys, at);
+        if (lw_schema_applies(keys, at))
+            out[keys->name] = value(*keys, at, root);
     return out;
 }
 
@@ -99,7 +115,8 @@ Scene Scene::read(const std::string &text, const std::string &name, const std::v
 
 nb::dict Scene::to_dict() const
 {
-    return section(lw_scene_keys(), reinterpret_cast<const unsigned char *>(&data));
+    const auto *root = reinterpret_cast<const unsigned char *>(&data);
+    return section(lw_scene_keys(), root, root);
 }
 
 std::string Scene::to_yaml() const
