@@ -1,6 +1,7 @@
-"""Commands of `leeway` that look at the machine and the running programs; they change nothing."""
+"""Commands of `leeway` that look at the machine and the running programs."""
 
 import json
+import os
 import sys
 from typing import Annotated
 
@@ -13,6 +14,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
     command(app, "doctor", "leeway doctor")(doctor)
     command(app, "status", "leeway status --watch")(status)
+    command(app, "spy", "leeway spy")(spy)
 
 
 def _group(url: str | None) -> str:
@@ -69,3 +71,22 @@ def status(
         print(json.dumps({"programs": [sender.to_json() for sender in senders]}, indent=2))
     elif not common.quiet:
         Console().print(watch.table(senders))
+
+
+def spy(*, common: Common) -> None:
+    """Open lcm-spy: every channel decoded; right click on WORLD puts obstacles on the bus."""
+    from leeway import bus, processes
+    from leeway.spy import SpyMissing, prepare
+
+    if common.as_json:
+        fail("lcm-spy is a window: there is no --json", EXIT_USAGE)
+    try:
+        command, environment = prepare(common.url, common.name)
+    except (SpyMissing, bus.BusError, processes.ProgramMissing) as error:
+        fail(str(error))
+    if common.quiet:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    else:
+        print("leeway: lcm-spy's own NoClassDefFoundError lines are harmless", file=sys.stderr)
+    sys.stdout.flush()
+    os.execve(command[0], command, environment)

@@ -21,6 +21,7 @@ CHECKS: dict[str, Callable[[Machine], Finding]] = {
     "lcm_version": programs.lcm_version,
     "lcm_on_path": programs.lcm_on_path,
     "java": programs.java,
+    "spy_plugin": programs.spy_plugin,
     "route": network.route,
     "loopback_flag": network.loopback_flag,
     "multicast": network.multicast,

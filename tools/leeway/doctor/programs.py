@@ -17,6 +17,8 @@ LCM_TOOLS = ("lcm-logger", "lcm-logplayer", "lcm-gen", "lcm-spy")
 OLDEST_LCM = (1, 5)
 OLDEST_JAVA = 8
 INSTALL_JAVA = "sudo apt-get install default-jre"
+SPY_JAR = "leeway-spy.jar"
+INSTALL_SPY = "sudo apt-get install default-jdk && ./dev setup"
 
 
 def programs(machine: Machine) -> Finding:
@@ -101,3 +103,13 @@ def java(machine: Machine) -> Finding:
         text = f"Java {settings['java.version']} is headless: lcm-spy cannot open its window"
         return Finding(WARNING, text, INSTALL_JAVA)
     return Finding(OK, f"Java {settings['java.version']} for lcm-spy")
+
+
+def spy_plugin(_: Machine) -> Finding:
+    """The jar of lcm-spy's plugin, which is built where a JDK is."""
+    try:
+        program(SPY_JAR)
+    except ProgramMissing:
+        text = "lcm-spy's plugin was not built, there was no JDK: `leeway spy` will not start"
+        return Finding(WARNING, text, INSTALL_SPY)
+    return Finding(OK, "lcm-spy's plugin is built")
