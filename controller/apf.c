@@ -104,6 +104,8 @@ static void apf_step(const struct lw_law_params *law, const struct lw_law_input 
     // Repulsion at the nearest point of every part, equation (4).
     for (int i = 0; i < around->near.count; i++) {
         const struct lw_near *pair = &around->near.pair[i];
+        if (pair->fixed)
+            continue;
         if (pair->obstacle != 0)
             repel_obstacle(params, in, pair, &wrench);
         else

@@ -13,8 +13,7 @@
 
 #include <math.h> // fmax, sqrt
 
-static const double rounding = 1e-9;  // a wish scaled to its part need not come out as wholly allowed
-static const double arm_length = 1.6; // m, no point of a UR5 or UR10 with its tool is farther from any of its axes
+static const double rounding = 1e-9; // a wish scaled to its part need not come out as wholly allowed
 
 // Time to come to rest along a straight line in joint space.
 static double braking_time(const struct lw_limits *limits, const double velocity[LW_NJ])
@@ -25,19 +24,19 @@ static double braking_time(const struct lw_limits *limits, const double velocity
     return longest;
 }
 
-double lw_clearance_reach(const struct lw_limits *limits, double period_s, const double velocity[LW_NJ],
-                          double obstacle_speed)
+double lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body, double obstacle_speed)
 {
+    const struct lw_limits *limits = in->limits;
     if (isinf(limits->clearance))
         return 0;
     // The fastest that the next tick can make it, as far as the speed limits allow.
     double next[LW_NJ], speed = 0;
     for (int j = 0; j < LW_NJ; j++) {
-        next[j] = fmin(fabs(velocity[j]) + limits->acceleration[j] * period_s, limits->velocity[j]);
-        speed += next[j] * arm_length;
+        next[j] = fmin(fabs(in->velocity[j]) + limits->acceleration[j] * in->period_s, limits->velocity[j]);
+        speed += next[j] * body->lever[j];
     }
     const double time = braking_time(limits, next);
-    return limits->clearance + speed * (time / 2 + period_s) + obstacle_speed * (time + period_s);
+    return limits->clearance + speed * (time / 2 + in->period_s) + obstacle_speed * (time + in->period_s);
 }
 
 void lw_clearance_rooms(const struct lw_limits *limits, const struct lw_body *body, const struct lw_surroundings *s,
@@ -48,6 +47,8 @@ void lw_clearance_rooms(const struct lw_limits *limits, const struct lw_body *bo
         return;
     for (int i = 0; i < s->near.count; i++) {
         const struct lw_near *pair = &s->near.pair[i];
+        if (pair->fixed)
+            continue;
         struct lw_room *room = &rooms->room[rooms->count++];
         lw_surroundings_gradient(s, body, pair, room->gradient);
         room->room = pair->distance.d - limits->clearance;

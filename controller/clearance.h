@@ -27,12 +27,11 @@ struct lw_rooms {
     struct lw_room room[LW_NEAR_MAX];
 };
 
-// Distance (m) within which lw_clearance_command may have something to say, at a velocity in force: the way of the
-// fastest point of the arm until it rests, and that of the fastest obstacle.
-double lw_clearance_reach(const struct lw_limits *limits, double period_s, const double velocity[LW_NJ],
-                          double obstacle_speed);
+// Distance (m) within which lw_clearance_command may have something to say: the way of the fastest point of the arm
+// until it rests, and that of the fastest obstacle. Only limits, period and velocity of *in are looked at.
+double lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body, double obstacle_speed);
 
-// Lists the rooms of all near pairs. With the clearance off there are none.
+// Lists the rooms of all near pairs that the joints can change. With the clearance off there are none.
 void lw_clearance_rooms(const struct lw_limits *limits, const struct lw_body *body, const struct lw_surroundings *s,
                         struct lw_rooms *rooms);
 

@@ -70,7 +70,10 @@ static double roll(struct lw_rollout *rollout, const struct lw_escape_model *mod
 {
     const double period_s = (double)step_ns / (double)LW_NS_PER_S;
     const struct lw_law_reach reach = model->law->reach(model->params, now->world->speed_max);
-    const double brake = lw_clearance_reach(model->limits, period_s, rollout->velocity, now->world->speed_max);
+    double wish[LW_NJ], command[LW_NJ], to_goal[3];
+    const struct lw_guard_input guard = {
+        .limits = model->limits, .period_s = period_s, .q = rollout->q, .velocity = rollout->velocity, .wish = wish};
+    const double brake = lw_clearance_reach(&guard, model->body, now->world->speed_max);
     const struct lw_eyes eyes = {.arm = model->arm,
                                  .body = model->body,
                                  .world = now->world,
@@ -79,16 +82,12 @@ static double roll(struct lw_rollout *rollout, const struct lw_escape_model *mod
                                  .self_reach = fmax(reach.self, brake)};
     struct lw_surroundings around;
     struct lw_rooms rooms;
-    double wish[LW_NJ], to_goal[3];
     if (lw_surroundings_look(&eyes, rollout->q, &around) != LW_OK)
         return HUGE_VAL;
     const struct lw_law_input in = {
         .around = &around, .body = model->body, .goal = now->goal, .circulation = rollout->circulation};
     model->law->step(model->params, &in, wish);
     lw_clearance_rooms(model->limits, model->body, &around, &rooms);
-    const struct lw_guard_input guard = {
-        .limits = model->limits, .period_s = period_s, .q = rollout->q, .velocity = rollout->velocity, .wish = wish};
-    double command[LW_NJ];
     (void)lw_clearance_command(&guard, &rooms, command);
     for (int j = 0; j < LW_NJ; j++)
         rollout->q[j] += period_s * command[j];

@@ -8,8 +8,6 @@
 // Errors   none.
 #include "controller/stuck.h"
 
-#include <math.h> // fmin, fmax
-
 static const double band = 0.01; // m
 static const int64_t sample_ns = 8 * 1000 * 1000, window_ns = 800 * 1000 * 1000;
 
@@ -26,15 +24,16 @@ static int64_t periods_in(int64_t time_ns, int64_t period_ns)
     return (time_ns + period_ns - 1) / period_ns;
 }
 
-// Width of the band in which the samples lie.
-static double spread(const struct lw_stuck *stuck, int count)
+// Whether all samples lie within the band.
+static bool is_still(const struct lw_stuck *stuck, int count)
 {
     double low = stuck->deviation[0], high = low;
-    for (int i = 1; i < count; i++) {
-        low = fmin(low, stuck->deviation[i]);
-        high = fmax(high, stuck->deviation[i]);
+    for (int i = 1; i < count && high - low < band; i++) {
+        const double deviation = stuck->deviation[i];
+        low = deviation < low ? deviation : low;
+        high = deviation > high ? deviation : high;
     }
-    return high - low;
+    return high - low < band;
 }
 
 bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, int64_t period_ns, int64_t time_ns)
@@ -46,7 +45,7 @@ bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, i
         return stuck->since_ns != 0;
     stuck->deviation[tick / every % length] = deviation;
     stuck->count = stuck->count < length ? stuck->count + 1 : length;
-    const bool still = stuck->count == length && deviation > tolerance && spread(stuck, length) < band;
+    const bool still = stuck->count == length && deviation > tolerance && is_still(stuck, length);
     if (!still)
         stuck->since_ns = 0;
     else if (stuck->since_ns == 0)

@@ -8,7 +8,28 @@
 // Errors   see surroundings.h.
 #include "controller/surroundings.h"
 
+#include <math.h>   // fabs, fmax
 #include <stddef.h> // NULL
+
+// Shoulder and upper arm stand on a table as near as millimetres, and no motion of theirs changes that.
+enum { LAST_MOUNTED = 2 };
+static const double fixed_within = 0.05; // m
+static const double fixed_lever = 0.02;  // m/rad
+
+// Notes near pairs whose distance the joints cannot change: the arm and what it is mounted on.
+static void find_fixed(const struct lw_body *body, struct lw_surroundings *s)
+{
+    for (int i = 0; i < s->near.count; i++) {
+        struct lw_near *pair = &s->near.pair[i];
+        if (pair->obstacle == 0 || pair->distance.d > fixed_within || body->part[pair->part].link > LAST_MOUNTED)
+            continue;
+        double gradient[LW_NJ], largest = 0;
+        lw_surroundings_gradient(s, body, pair, gradient);
+        for (int j = 0; j < LW_NJ; j++)
+            largest = fmax(largest, fabs(gradient[j]));
+        pair->fixed = largest < fixed_lever;
+    }
+}
 
 enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[LW_NJ], struct lw_surroundings *out)
 {
@@ -24,6 +45,7 @@ enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[L
                                         .warm = eyes->warm};
     lw_near_range(&query, &out->near);
     lw_near_self(eyes->body, &out->placed, eyes->self_reach, &out->near);
+    find_fixed(eyes->body, out);
     return LW_OK;
 }
 

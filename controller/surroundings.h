@@ -33,7 +33,8 @@ struct lw_surroundings {
     struct lw_near_list near;    // pairs within reach
 };
 
-// Looks around at a configuration.
+// Looks around at a configuration. Pairs of shoulder or upper arm and an obstacle that the joints can bring no more than
+// 2 cm/rad nearer, within 5 cm, are marked as fixed: the arm and what it is mounted on.
 //   q  in  [6] rad
 // Fails LW_E_NOT_FINITE; *out is undefined then. Cost: that of the near pairs.
 LW_MUST_CHECK enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[LW_NJ],

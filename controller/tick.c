@@ -96,7 +96,9 @@ static bool look(const struct lw_controller *config, struct lw_controller_state 
 {
     const double speed = in->world->speed_max;
     const struct lw_law_reach reach = config->law->reach(&config->params, speed);
-    const double brake = lw_clearance_reach(&config->limits, period_s(config), state->velocity, speed);
+    const struct lw_guard_input motion = {
+        .limits = &config->limits, .period_s = period_s(config), .velocity = state->velocity};
+    const double brake = lw_clearance_reach(&motion, &config->body, speed);
     const struct lw_eyes eyes = {.arm = config->arm,
                                  .body = &config->body,
                                  .world = in->world,
@@ -118,7 +120,7 @@ static bool is_contact(const struct lw_controller *config, const struct lw_surro
     for (int i = 0; i < around->near.count; i++) {
         const struct lw_near *pair = &around->near.pair[i];
         contact |= !isfinite(pair->distance.d);
-        contact |= pair->obstacle != 0 && (pair->distance.flags & LW_DISTANCE_CORE);
+        contact |= pair->obstacle != 0 && !pair->fixed && (pair->distance.flags & LW_DISTANCE_CORE);
     }
     return contact;
 }
@@ -185,7 +187,8 @@ static void guard(const struct lw_controller *config, struct lw_controller_state
                   const struct lw_surroundings *around, struct lw_joint_command *out)
 {
     static const double rest[LW_NJ] = {0};
-    struct lw_rooms rooms = {.count = 0};
+    struct lw_rooms rooms; // large: only its count is set
+    rooms.count = 0;
     const struct lw_guard_input guard_in = {.limits = &config->limits,
                                             .period_s = period_s(config),
                                             .q = in->joint->q,

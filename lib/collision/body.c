@@ -188,6 +188,22 @@ static void add_pairs(struct lw_body *body)
                     body->pair[body->pair_count++] = (struct lw_body_pair){(uint8_t)i, (uint8_t)j};
 }
 
+// A part is within its own size of its frame's origin, and each link within its DH lengths of the one before.
+static void find_levers(enum lw_robot robot, struct lw_body *body)
+{
+    const struct lw_arm *arm = lw_arm_get(robot);
+    for (int i = 0; i < body->count; i++) {
+        const struct lw_capsule *c = &body->part[i].capsule;
+        const double a = lw_vec_norm(c->a), b = lw_vec_norm(c->b);
+        double reach = (a > b ? a : b) + c->r;
+        for (int j = body->part[i].link - 1; j >= 0; j--) {
+            const double lever = reach + fabs(arm->a[j]); // d is along the joint's own axis
+            body->lever[j] = lever > body->lever[j] ? lever : body->lever[j];
+            reach += hypot(arm->a[j], arm->d[j]);
+        }
+    }
+}
+
 void lw_body_make(enum lw_robot robot, enum lw_body_model model, const struct lw_tool *tool, struct lw_body *body)
 {
     *body = (struct lw_body){.tool_part = -1};
@@ -210,6 +226,7 @@ void lw_body_make(enum lw_robot robot, enum lw_body_model model, const struct lw
         add_tool(tool, body);
     if (model != LW_BODY_JOINTS)
         add_pairs(body);
+    find_levers(robot, body);
 }
 
 // --- placing ---

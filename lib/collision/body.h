@@ -56,6 +56,7 @@ struct lw_body {
     int tool_part; // -1 = no tool
     struct lw_tool tool;
     struct lw_body_hull hull; // of a tool that is one
+    double lever[LW_NJ];      // m, no point of a part that joint i+1 moves is farther from its axis
 };
 
 // A body at one configuration.

@@ -17,7 +17,7 @@
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
 
-enum { BOXES = LW_WORLD_BLOCKS + LW_WORLD_GROUPS };
+enum { BOXES = LW_WORLD_BLOCKS + LW_WORLD_GROUPS, FEW_BLOCKS = 3 };
 
 // A query with what its time makes of the world: how far the members of each box may have moved.
 struct sweep {
@@ -64,7 +64,14 @@ struct walk {
 
 static struct walk walk_from(const struct sweep *sweep, const struct lw_cull *link)
 {
-    return (struct walk){.sweep = sweep, .link = link, .first_group = -LW_WORLD_BLOCK};
+    struct walk walk = {.sweep = sweep, .link = link, .first_group = -LW_WORLD_BLOCK};
+    // Few blocks are visited all: asking their boxes first would cost more.
+    const int blocks = sweep->query->world->blocks;
+    if (blocks <= FEW_BLOCKS) {
+        walk.first_group = sweep->query->world->groups;
+        walk.blocks = (1U << blocks) - 1;
+    }
+    return walk;
 }
 
 static int take_lowest(unsigned *bits)
@@ -169,6 +176,7 @@ static bool measure(const struct lw_near_query *query, int part, int i, double d
     out->part = part;
     out->obstacle = (int)item->shape.id;
     out->other = -1;
+    out->fixed = false;
     struct lw_moving since;
     const struct lw_moving *moving = NULL;
     if (item->traits & LW_TRAIT_EXTRAPOLATED) {
@@ -239,9 +247,28 @@ static void measure_self(const struct lw_body *body, const struct lw_placed *pla
     lw_distance_link(&placed->capsule[pair.part], &tool, (double)INFINITY, NULL, &out->distance);
 }
 
+// Whether two parts are farther apart than d_max for certain.
+static bool far_apart(const struct lw_capsule *a, const struct lw_capsule *b, double d_max)
+{
+    double between[3], square = 0, reach = 2 * (a->r + b->r + d_max);
+    for (int k = 0; k < 3; k++) {
+        between[k] = a->a[k] + a->b[k] - b->a[k] - b->b[k]; // twice that of their middles
+        square += between[k] * between[k];
+    }
+    double length[2][3];
+    lw_vec_sub(a->b, a->a, length[0]);
+    lw_vec_sub(b->b, b->a, length[1]);
+    reach += lw_vec_norm(length[0]) + lw_vec_norm(length[1]);
+    return square > reach * reach * (1 + 1e-9);
+}
+
 void lw_near_self(const struct lw_body *body, const struct lw_placed *placed, double d_max, struct lw_near_list *out)
 {
     for (int i = 0; i < body->pair_count; i++) {
+        const struct lw_capsule *part = &placed->capsule[body->pair[i].part],
+                                *other = &placed->capsule[body->pair[i].other];
+        if (far_apart(part, other, d_max))
+            continue;
         struct lw_near spare, *near = out->count < LW_NEAR_MAX ? &out->pair[out->count] : &spare;
         measure_self(body, placed, body->pair[i], near);
         if (near->distance.d > d_max)

@@ -14,7 +14,8 @@
 #include "collision/distance.h" // struct lw_distance, struct lw_warm
 #include "collision/snapshot.h" // struct lw_snapshot
 
-#include <stdint.h> // int64_t
+#include <stdbool.h> // bool
+#include <stdint.h>  // int64_t
 
 enum { LW_NEAR_MAX = 1024, LW_WARM_SLOTS = 512 };
 
@@ -27,6 +28,7 @@ struct lw_near {
     int part;                    // of the body
     int obstacle;                // id; 0 = self pair, or none
     int other;                   // self pair: the other part; else -1
+    bool fixed;                  // set by whoever knows the joints: they hardly change d; false at first
 };
 
 struct lw_near_list {

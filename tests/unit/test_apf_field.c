@@ -86,7 +86,8 @@ static double slope(const struct lw_law_params *law, const double q[LW_NJ], int 
     return (8 * (value[0] - value[1]) - (value[2] - value[3])) / (12 * h);
 }
 
-// Whether a pair of the list is so near the end of its field that a difference would reach beyond.
+// Whether a pair of the list is so near the end of its field that a difference would reach beyond, or left out because
+// the joints hardly change it.
 static bool at_an_end(const struct lw_apf_params *p, const struct lw_near_list *pairs)
 {
     bool any = false;
@@ -95,7 +96,7 @@ static bool at_an_end(const struct lw_apf_params *p, const struct lw_near_list *
         const bool self = pair->obstacle == 0;
         const double d = pair->distance.d - (self ? 0 : p->approach_s * closing(pair));
         any |= fabs(d - (self ? p->rho_self : p->rho_rep)) < 2e-3 || d < 2e-3 + p->distance_min;
-        any |= (pair->distance.flags & LW_DISTANCE_CORE) != 0;
+        any |= (pair->distance.flags & LW_DISTANCE_CORE) != 0 || pair->fixed;
     }
     return any;
 }

@@ -191,6 +191,8 @@ static void the_reach_covers_what_could_matter(void **state)
 {
     (void)state;
     struct random random = {74};
+    static struct lw_body body;
+    lw_body_make(LW_UR10, LW_BODY_CAPSULES, NULL, &body);
     for (int n = 0; n < 2000; n++) {
         const struct lw_limits l = limits(random_in(&random, 1, 30));
         const double obstacle = random_in(&random, 0, 1);
@@ -198,18 +200,20 @@ static void the_reach_covers_what_could_matter(void **state)
         random_fill(&random, -2, 2, velocity, LW_NJ);
         for (int j = 0; j < LW_NJ; j++)
             next[j] = fmin(fabs(velocity[j]) + l.acceleration[j] * period_s, l.velocity[j]);
-        const double reach = lw_clearance_reach(&l, period_s, velocity, obstacle);
+        const struct lw_guard_input in = {.limits = &l, .period_s = period_s, .velocity = velocity};
+        const double reach = lw_clearance_reach(&in, &body, obstacle);
         static struct lw_rooms rooms = {.count = 1};
         rooms.room[0].room = reach - l.clearance;
         rooms.room[0].approach = obstacle;
         for (int j = 0; j < LW_NJ; j++)
-            rooms.room[0].gradient[j] = -1.6;
+            rooms.room[0].gradient[j] = next[j] > 0 ? -body.lever[j] : 0;
         assert_near(lw_clearance_part(&l, period_s, &rooms, next), 1, 1e-12);
     }
     struct lw_limits off = limits(8);
     off.clearance = HUGE_VAL;
     const double velocity[LW_NJ] = {1};
-    assert_near(lw_clearance_reach(&off, period_s, velocity, 1), 0, 0);
+    const struct lw_guard_input in = {.limits = &off, .period_s = period_s, .velocity = velocity};
+    assert_near(lw_clearance_reach(&in, &body, 1), 0, 0);
 }
 
 int main(void)

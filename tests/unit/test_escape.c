@@ -87,7 +87,8 @@ static struct rig scene_b(int remedy, int64_t period_ns)
 static void go(struct rig *rig)
 {
     const double period_s = (double)rig->period_ns * 1e-9;
-    const double reach = fmax(rig->params.apf.rho_rep, lw_clearance_reach(&rig->limits, period_s, rig->velocity, 0));
+    const struct lw_guard_input motion = {.limits = &rig->limits, .period_s = period_s, .velocity = rig->velocity};
+    const double reach = fmax(rig->params.apf.rho_rep, lw_clearance_reach(&motion, &rig->body, 0));
     const struct lw_eyes eyes = {.arm = lw_arm_get(LW_UR5),
                                  .body = &rig->body,
                                  .world = &world,

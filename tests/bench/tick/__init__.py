@@ -1,0 +1,1 @@
+"""How long a whole tick takes (./dev bench tick)."""
