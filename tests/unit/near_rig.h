@@ -96,8 +96,9 @@ static inline void rig_motion(struct random *random, int64_t seen_ns, struct lw_
 // Tells of one more obstacle, at rest, within `spread` of the origin.
 static inline struct told *rig_tell(struct near_rig *rig, enum lw_shape_kind kind, double spread)
 {
-    assert_true(rig->count < TOLD_MAX);
-    struct told *told = &rig->told[rig->count];
+    if (rig->count < 0 || rig->count >= TOLD_MAX)
+        fail_msg("the rig holds %d obstacles at most", TOLD_MAX);
+    struct told *told = &rig->told[rig->count % TOLD_MAX];
     told->id = ++rig->count;
     told->generation = 1;
     told->motion = (struct lw_motion){.time_ns = 0};

@@ -9,6 +9,23 @@
 #include "near_rig.h"
 #include "program/allocations.h" // lw_allocations_*
 
+// The linker puts this before every query of one pair.
+// NOLINTBEGIN(bugprone-reserved-identifier,misc-use-internal-linkage,readability-*)
+void __real_lw_distance_link(const struct lw_capsule *link, const struct lw_shape *shape, double d_max,
+                             struct lw_warm *warm, struct lw_distance *out);
+void __wrap_lw_distance_link(const struct lw_capsule *link, const struct lw_shape *shape, double d_max,
+                             struct lw_warm *warm, struct lw_distance *out);
+
+static int measured;
+
+void __wrap_lw_distance_link(const struct lw_capsule *link, const struct lw_shape *shape, double d_max,
+                             struct lw_warm *warm, struct lw_distance *out)
+{
+    measured++;
+    __real_lw_distance_link(link, shape, d_max, warm, out);
+}
+// NOLINTEND(bugprone-reserved-identifier,misc-use-internal-linkage,readability-*)
+
 // --- warm against cold ---
 
 static void check_same(const struct lw_near *warm, const struct lw_near *cold)
@@ -134,14 +151,17 @@ static void the_table_is_of_use(void **state)
     (void)state;
     struct near_rig *rig = hulls(65, 300);
     double q[LW_NJ] = {0.5, -1.5, 1, 0.3, 0.8, 0};
-    int warm_supports = 0, cold_supports = 0;
+    int warm_supports = 0, cold_supports = 0, in_range = 0, for_range = 0, for_nearest = 0;
     for (int n = 0; n < 200; n++) {
         struct lw_near_query query = rig_query(rig, SECOND, 0.3);
         struct lw_near each[LW_BODY_MAX];
         for (int j = 0; j < LW_NJ; j++)
             q[j] += 1e-3;
         rig_pose(rig, LW_UR5, q);
+        measured = 0;
         lw_near_range(&query, &rig->list);
+        in_range += rig->list.needed;
+        for_range += measured;
         for (int i = 0; i < rig->list.count && n > 0; i++)
             warm_supports += rig->list.pair[i].distance.iterations;
         query.warm = NULL;
@@ -149,7 +169,9 @@ static void the_table_is_of_use(void **state)
         for (int i = 0; i < rig->list.count && n > 0; i++)
             cold_supports += rig->list.pair[i].distance.iterations;
         query.warm = &rig->warm;
+        measured = 0;
         lw_near_each(&query, each);
+        for_nearest += n > 0 ? measured : 0;
         for (int part = 0; part < rig->body.count; part++) {
             const struct lw_warm_pair *kept = &rig->warm.each[part];
             assert_int_equal(kept->id, each[part].obstacle);
@@ -157,6 +179,9 @@ static void the_table_is_of_use(void **state)
         }
     }
     assert_true(cold_supports > 10000 && warm_supports < 0.6 * cold_supports);
+    // Few pairs are measured that are not wanted.
+    assert_true(for_range < 1.25 * in_range);
+    assert_true(for_nearest < 1.5 * 199 * rig->body.count);
 }
 
 // --- what must not happen ---
