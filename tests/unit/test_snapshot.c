@@ -86,7 +86,9 @@ static void everything_is_kept(void **state)
     uint32_t last = 0;
     for (int i = 0; i < rig->world.count; i++) {
         const struct lw_snapshot_item *item = &rig->world.item[i];
-        const struct told *told = &rig->told[(item->shape.id - 1) % TOLD_MAX];
+        if (item->shape.id < 1 || item->shape.id > TOLD_MAX)
+            fail_msg("id %u was never told", item->shape.id);
+        const struct told *told = &rig->told[item->shape.id - 1];
         assert_false(seen[item->shape.id]);
         seen[item->shape.id] = true;
         assert_int_equal(item->shape.kind, told->solid.kind);
