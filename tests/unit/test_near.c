@@ -169,6 +169,8 @@ static void many_at_one_point(void **state)
         told->solid.radius = 0.05;
     }
     rig_build(rig, &rig->world);
+    for (int i = 0; i < 1000; i++)
+        assert_int_equal(rig->world.item[i].shape.id, i + 1);
     rig_random_pose(rig, LW_UR5);
     check_all(rig, 0.1);
     check_all(rig, 3);
@@ -188,7 +190,8 @@ static void ties(void **state)
 {
     (void)state;
     struct near_rig *rig = near_rig(25);
-    for (int n = 0; n < 200; n++) {
+    int twins = 0, other_parts = 0;
+    for (int n = 0; n < 400; n++) {
         struct lw_near smallest;
         const struct lw_near_query query = rig_query(rig, SECOND, 1);
         lw_body_make(LW_UR5, LW_BODY_CAPSULES, NULL, &rig->body);
@@ -205,12 +208,26 @@ static void ties(void **state)
         rig_random_pose(rig, LW_UR5);
         rig->placed.capsule[4] = rig->placed.capsule[5] = rig->placed.capsule[2];
         rig_build(rig, &rig->world);
-        rig->warm.smallest = (struct lw_warm_pair){5, random_below(&rig->random, 40), 0};
-        rig->warm.smallest.id = (int)rig->world.item[rig->warm.smallest.index].shape.id;
+        rig->warm.smallest.id = 0;
         lw_near_smallest(&query, &smallest);
-        assert_true(smallest.obstacle == 0 || smallest.obstacle % 2 == 1);
-        assert_true(smallest.part != 4 && smallest.part != 5);
+        const struct lw_near first = smallest;
+        if (first.obstacle == 0)
+            continue;
+        assert_true(first.obstacle % 2 == 1 && first.part != 4 && first.part != 5);
+        // The search starts from its equal, of the other obstacle or of another part.
+        for (int i = 0; i < rig->world.count; i++) {
+            const int id = (int)rig->world.item[i].shape.id, part = first.part == 2 ? 2 + n % 4 : first.part;
+            if ((id != first.obstacle && id != first.obstacle + 1) || part == 3)
+                continue;
+            rig->warm.smallest = (struct lw_warm_pair){part, i, id};
+            lw_near_smallest(&query, &smallest);
+            assert_int_equal(smallest.obstacle, first.obstacle);
+            assert_int_equal(smallest.part, first.part);
+            other_parts += part != first.part;
+            twins += id != first.obstacle;
+        }
     }
+    assert_true(twins > 100 && other_parts > 20);
 }
 
 int main(void)
