@@ -199,25 +199,40 @@ static void copies_are_snapshots_of_their_own(void **state)
     }
 }
 
+enum { WAYS = 11 };
+
+// An obstacle made bad in one of the ways.
+static void spoil(struct told *bad, int way)
+{
+    const int k = way % 3;
+    bad->solid.vertex = bad->vertex;
+    switch (way) {
+    case 0: bad->id = 0; break;
+    case 1: bad->id = -3; break;
+    case 2: bad->motion.v[k] = (double)INFINITY; break;
+    case 3: bad->motion.omega[k] = NO_NUMBER; break;
+    case 4: bad->motion.time_ns = -1; break;
+    case 5: bad->motion.expires_ns = -1; break;
+    case 6: bad->pose.p[k] = NO_NUMBER; break;
+    case 7: bad->pose.r[4] += 0.5; break;
+    case 8: bad->solid.kind = LW_SHAPE_KINDS; break;
+    default:
+        bad->solid.kind = LW_HULL;
+        bad->solid.count = way == 9 ? 0 : LW_HULL_MAX + 1;
+        break;
+    }
+}
+
 // What is refused leaves the snapshot as it was.
 static void hostile_obstacles_are_refused(void **state)
 {
     (void)state;
     struct near_rig *rig = mixed(86, 20);
-    for (int n = 0; n < 11; n++) {
+    for (int way = 0; way < WAYS; way++) {
         lw_snapshot_begin(&rig->later);
         for (int i = 0; i < 20; i++) {
             struct told bad = rig->told[i];
-            bad.solid.vertex = bad.vertex;
-            bad.id = n == 0 ? 0 : n == 1 ? -3 : bad.id;
-            bad.motion.v[n % 3] = n == 2 ? (double)INFINITY : bad.motion.v[n % 3];
-            bad.motion.omega[n % 3] = n == 3 ? NO_NUMBER : bad.motion.omega[n % 3];
-            bad.motion.time_ns = n == 4 ? -1 : bad.motion.time_ns;
-            bad.motion.expires_ns = n == 5 ? -1 : bad.motion.expires_ns;
-            bad.pose.p[n % 3] = n == 6 ? NO_NUMBER : bad.pose.p[n % 3];
-            bad.pose.r[4] += n == 7 ? 0.5 : 0;
-            bad.solid.kind = n == 8 ? LW_SHAPE_KINDS : n == 9 || n == 10 ? LW_HULL : bad.solid.kind;
-            bad.solid.count = n == 9 ? 0 : n == 10 ? LW_HULL_MAX + 1 : bad.solid.count;
+            spoil(&bad, way);
             assert_int_equal(add(&rig->later, told_at(rig, i)), LW_OK);
             assert_int_not_equal(add(&rig->later, &bad), LW_OK);
         }
