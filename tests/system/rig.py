@@ -103,10 +103,14 @@ class Record:
         self._thread.join()
         self._bus.socket.close()
 
+    def packets(self) -> list[tuple[str, bytes]]:
+        """Return channel and payload of all that came so far."""
+        found = [split(datagram) for datagram in list(self._datagrams)]
+        return [packet for packet in found if packet is not None]
+
     def read(self, channel: str) -> list[Any]:
         """Return all messages of a channel."""
-        packets = (split(datagram) for datagram in self._datagrams)
-        return [TYPES[channel].decode(p[1]) for p in packets if p is not None and p[0] == channel]
+        return [TYPES[channel].decode(data) for name, data in self.packets() if name == channel]
 
 
 @contextlib.contextmanager
