@@ -39,15 +39,15 @@ double lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body 
     return limits->clearance + speed * (time / 2 + in->period_s) + obstacle_speed * (time + in->period_s);
 }
 
-void lw_clearance_rooms(const struct lw_limits *limits, const struct lw_body *body, const struct lw_surroundings *s,
-                        struct lw_rooms *rooms)
+void lw_clearance_rooms(const struct lw_limits *limits, double reach, const struct lw_body *body,
+                        const struct lw_surroundings *s, struct lw_rooms *rooms)
 {
     rooms->count = 0;
     if (isinf(limits->clearance))
         return;
     for (int i = 0; i < s->near.count; i++) {
         const struct lw_near *pair = &s->near.pair[i];
-        if (pair->fixed)
+        if (pair->fixed || pair->distance.d > reach)
             continue;
         struct lw_room *room = &rooms->room[rooms->count++];
         lw_surroundings_gradient(s, body, pair, room->gradient);

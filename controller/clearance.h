@@ -32,8 +32,9 @@ struct lw_rooms {
 double lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body, double obstacle_speed);
 
 // Lists the rooms of all near pairs that the joints can change. With the clearance off there are none.
-void lw_clearance_rooms(const struct lw_limits *limits, const struct lw_body *body, const struct lw_surroundings *s,
-                        struct lw_rooms *rooms);
+//   reach  in  m, of lw_clearance_reach: pairs farther apart have nothing to say
+void lw_clearance_rooms(const struct lw_limits *limits, double reach, const struct lw_body *body,
+                        const struct lw_surroundings *s, struct lw_rooms *rooms);
 
 // Largest part in [0, 1] of a velocity that can be braked to rest within every room. Braking along a straight line in
 // joint space takes T = max |qd_j| / a_j; with c = -gradient . qd the pair needs c (T/2 + period) of its room, and

@@ -87,7 +87,7 @@ static double roll(struct lw_rollout *rollout, const struct lw_escape_model *mod
     const struct lw_law_input in = {
         .around = &around, .body = model->body, .goal = now->goal, .circulation = rollout->circulation};
     model->law->step(model->params, &in, wish);
-    lw_clearance_rooms(model->limits, model->body, &around, &rooms);
+    lw_clearance_rooms(model->limits, brake, model->body, &around, &rooms);
     (void)lw_clearance_command(&guard, &rooms, command);
     for (int j = 0; j < LW_NJ; j++)
         rollout->q[j] += period_s * command[j];

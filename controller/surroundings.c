@@ -49,25 +49,17 @@ enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[L
     return LW_OK;
 }
 
-// Adds the effect of moving a point of a link along n: n . J.
-static void add_effect(const struct lw_surroundings *s, int link, const double point[3], const double n[3], double sign,
-                       double gradient[LW_NJ])
-{
-    double jacobian[3 * LW_NJ];
-    lw_arm_point_jacobian(s->frame, link, point, jacobian);
-    for (int j = 0; j < LW_NJ; j++)
-        gradient[j] += sign * (n[0] * jacobian[j] + n[1] * jacobian[LW_NJ + j] + n[2] * jacobian[2 * LW_NJ + j]);
-}
-
 void lw_surroundings_gradient(const struct lw_surroundings *s, const struct lw_body *body, const struct lw_near *pair,
                               double gradient[LW_NJ])
 {
     const struct lw_distance *d = &pair->distance;
+    double other[LW_NJ];
+    lw_arm_point_effect(s->frame, body->part[pair->part].link, d->pa, d->n, gradient);
+    if (pair->obstacle != 0)
+        return;
+    lw_arm_point_effect(s->frame, body->part[pair->other].link, d->pb, d->n, other);
     for (int j = 0; j < LW_NJ; j++)
-        gradient[j] = 0;
-    add_effect(s, body->part[pair->part].link, d->pa, d->n, 1, gradient);
-    if (pair->obstacle == 0)
-        add_effect(s, body->part[pair->other].link, d->pb, d->n, -1, gradient);
+        gradient[j] -= other[j];
 }
 
 const struct lw_near *lw_surroundings_nearest(const struct lw_surroundings *s, bool self)

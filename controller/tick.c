@@ -90,15 +90,22 @@ static void select_request(const struct lw_controller *config, struct lw_control
 
 // --- look around ---
 
+// How far the guard has to see.
+static double brake_reach(const struct lw_controller *config, const struct lw_controller_state *state,
+                          const struct lw_tick_input *in)
+{
+    const struct lw_guard_input motion = {
+        .limits = &config->limits, .period_s = period_s(config), .velocity = state->velocity};
+    return lw_clearance_reach(&motion, &config->body, in->world->speed_max);
+}
+
 // Finds all that the law or the guard may have to know of. False when the configuration is no number.
 static bool look(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
                  struct lw_surroundings *around)
 {
     const double speed = in->world->speed_max;
     const struct lw_law_reach reach = config->law->reach(&config->params, speed);
-    const struct lw_guard_input motion = {
-        .limits = &config->limits, .period_s = period_s(config), .velocity = state->velocity};
-    const double brake = lw_clearance_reach(&motion, &config->body, speed);
+    const double brake = brake_reach(config, state, in);
     const struct lw_eyes eyes = {.arm = config->arm,
                                  .body = &config->body,
                                  .world = in->world,
@@ -195,7 +202,7 @@ static void guard(const struct lw_controller *config, struct lw_controller_state
                                             .velocity = state->velocity,
                                             .wish = out->flags ? rest : out->qd_law};
     if (around != NULL)
-        lw_clearance_rooms(&config->limits, &config->body, around, &rooms);
+        lw_clearance_rooms(&config->limits, brake_reach(config, state, in), &config->body, around, &rooms);
     out->flags |= lw_clearance_command(&guard_in, &rooms, out->qd);
     out->mode = (out->flags & (LW_WAITING | LW_WARMING_UP)) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
     memcpy(state->velocity, out->qd, sizeof state->velocity);

@@ -52,6 +52,12 @@ void lw_arm_jacobian(const struct lw_pose frame[LW_NJ], double jacobian[36]);
 //   jacobian  out  [18] m/rad
 void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const double point[3], double jacobian[18]);
 
+// Speeds along a direction of a point fixed to a link, a joint each: n . J_x. The gradient of whatever grows along n.
+//   n       in   [3] direction, base frame
+//   effect  out  [6] m/rad for a unit n; joints beyond the link are 0
+void lw_arm_point_effect(const struct lw_pose frame[LW_NJ], int link, const double point[3], const double n[3],
+                         double effect[LW_NJ]);
+
 // Forces on the links, summed per link: the input of lw_arm_joint_effect.
 struct lw_wrench {
     double force[LW_NJ][3];  // sum of F, link i+1

@@ -76,6 +76,21 @@ void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const do
     }
 }
 
+void lw_arm_point_effect(const struct lw_pose frame[LW_NJ], int link, const double point[3], const double n[3],
+                         double effect[LW_NJ])
+{
+    double axis[3], origin[3], lever[3], moment[3];
+    for (int j = 0; j < LW_NJ; j++) {
+        effect[j] = 0;
+        if (j >= link)
+            continue;
+        joint_axis(frame, j, axis, origin);
+        lw_vec_sub(point, origin, lever);
+        lw_vec_cross(lever, n, moment);
+        effect[j] = lw_vec_dot(axis, moment);
+    }
+}
+
 void lw_wrench_add(struct lw_wrench *wrench, int link, const double point[3], const double force[3])
 {
     double moment[3];

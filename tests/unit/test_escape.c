@@ -122,7 +122,7 @@ static void go(struct rig *rig)
     rig->stuck = lw_escape_step(&rig->escape, &model, &now);
     const struct lw_guard_input guard = {
         .limits = &rig->limits, .period_s = period_s, .q = rig->q, .velocity = rig->velocity, .wish = wish};
-    lw_clearance_rooms(&rig->limits, &rig->body, &around, &rooms);
+    lw_clearance_rooms(&rig->limits, reach, &rig->body, &around, &rooms);
     (void)lw_clearance_command(&guard, &rooms, command);
     for (int j = 0; j < LW_NJ; j++)
         rig->q[j] += period_s * command[j];
