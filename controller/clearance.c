@@ -24,22 +24,25 @@ static double braking_time(const struct lw_limits *limits, const double velocity
     return longest;
 }
 
-double lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body, double obstacle_speed)
+struct lw_law_reach lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body,
+                                       const struct lw_surroundings *s, double obstacle_speed)
 {
     const struct lw_limits *limits = in->limits;
     if (isinf(limits->clearance))
-        return 0;
+        return (struct lw_law_reach){0, 0};
     // The fastest that the next tick can make it, as far as the speed limits allow.
-    double next[LW_NJ], speed = 0;
+    double next[LW_NJ], faster = 0;
     for (int j = 0; j < LW_NJ; j++) {
         next[j] = fmin(fabs(in->velocity[j]) + limits->acceleration[j] * in->period_s, limits->velocity[j]);
-        speed += next[j] * body->lever[j];
+        faster += fmax(next[j] - fabs(in->velocity[j]), 0) * body->lever[j];
     }
     const double time = braking_time(limits, next);
-    return limits->clearance + speed * (time / 2 + in->period_s) + obstacle_speed * (time + in->period_s);
+    const double way = (lw_surroundings_speed(s, body, in->velocity) + faster) * (time / 2 + in->period_s);
+    const double coming = obstacle_speed * (time + in->period_s);
+    return (struct lw_law_reach){.obstacles = limits->clearance + way + coming, .self = limits->clearance + 2 * way};
 }
 
-void lw_clearance_rooms(const struct lw_limits *limits, double reach, const struct lw_body *body,
+void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reach, const struct lw_body *body,
                         const struct lw_surroundings *s, struct lw_rooms *rooms)
 {
     rooms->count = 0;
@@ -47,7 +50,7 @@ void lw_clearance_rooms(const struct lw_limits *limits, double reach, const stru
         return;
     for (int i = 0; i < s->near.count; i++) {
         const struct lw_near *pair = &s->near.pair[i];
-        if (pair->fixed || pair->distance.d > reach)
+        if (pair->fixed || pair->distance.d > (pair->obstacle != 0 ? reach.obstacles : reach.self))
             continue;
         struct lw_room *room = &rooms->room[rooms->count++];
         lw_surroundings_gradient(s, body, pair, room->gradient);

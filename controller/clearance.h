@@ -11,6 +11,7 @@
 #define LW_CONTROLLER_CLEARANCE_H
 
 #include "controller/guard.h"        // lw_guard_shape
+#include "controller/law.h"          // struct lw_law_reach
 #include "controller/surroundings.h" // struct lw_surroundings
 
 #include <stdbool.h> // bool
@@ -27,13 +28,17 @@ struct lw_rooms {
     struct lw_room room[LW_NEAR_MAX];
 };
 
-// Distance (m) within which lw_clearance_command may have something to say: the way of the fastest point of the arm
-// until it rests, and that of the fastest obstacle. Only limits, period and velocity of *in are looked at.
-double lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body, double obstacle_speed);
+// Distances within which lw_clearance_command may have something to say: the way of the fastest point of the arm until
+// it rests, and that of the fastest obstacle; between links twice the former. Only limits, period and velocity of *in
+// are looked at.
+//   s               in  placed
+//   obstacle_speed  in  m/s
+struct lw_law_reach lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body,
+                                       const struct lw_surroundings *s, double obstacle_speed);
 
 // Lists the rooms of all near pairs that the joints can change. With the clearance off there are none.
-//   reach  in  m, of lw_clearance_reach: pairs farther apart have nothing to say
-void lw_clearance_rooms(const struct lw_limits *limits, double reach, const struct lw_body *body,
+//   reach  in  of lw_clearance_reach: pairs farther apart have nothing to say
+void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reach, const struct lw_body *body,
                         const struct lw_surroundings *s, struct lw_rooms *rooms);
 
 // Largest part in [0, 1] of a velocity that can be braked to rest within every room. Braking along a straight line in

@@ -73,17 +73,17 @@ static double roll(struct lw_rollout *rollout, const struct lw_escape_model *mod
     double wish[LW_NJ], command[LW_NJ], to_goal[3];
     const struct lw_guard_input guard = {
         .limits = model->limits, .period_s = period_s, .q = rollout->q, .velocity = rollout->velocity, .wish = wish};
-    const double brake = lw_clearance_reach(&guard, model->body, now->world->speed_max);
-    const struct lw_eyes eyes = {.arm = model->arm,
-                                 .body = model->body,
-                                 .world = now->world,
-                                 .time_ns = rollout->from_ns + rollout->steps * step_ns,
-                                 .reach = fmax(reach.obstacles, brake),
-                                 .self_reach = fmax(reach.self, brake)};
     struct lw_surroundings around;
     struct lw_rooms rooms;
-    if (lw_surroundings_look(&eyes, rollout->q, &around) != LW_OK)
+    if (lw_surroundings_place(model->arm, model->body, rollout->q, &around) != LW_OK)
         return HUGE_VAL;
+    const struct lw_law_reach brake = lw_clearance_reach(&guard, model->body, &around, now->world->speed_max);
+    const struct lw_eyes eyes = {.body = model->body,
+                                 .world = now->world,
+                                 .time_ns = rollout->from_ns + rollout->steps * step_ns,
+                                 .reach = fmax(reach.obstacles, brake.obstacles),
+                                 .self_reach = fmax(reach.self, brake.self)};
+    lw_surroundings_look(&eyes, &around);
     const struct lw_law_input in = {
         .around = &around, .body = model->body, .goal = now->goal, .circulation = rollout->circulation};
     model->law->step(model->params, &in, wish);

@@ -8,6 +8,8 @@
 // Errors   see surroundings.h.
 #include "controller/surroundings.h"
 
+#include "base/vec.h" // lw_vec_*
+
 #include <math.h>   // fabs, fmax
 #include <stddef.h> // NULL
 
@@ -31,12 +33,37 @@ static void find_fixed(const struct lw_body *body, struct lw_surroundings *s)
     }
 }
 
-enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[LW_NJ], struct lw_surroundings *out)
+enum lw_status lw_surroundings_place(const struct lw_arm *arm, const struct lw_body *body, const double q[LW_NJ],
+                                     struct lw_surroundings *out)
 {
-    const enum lw_status status = lw_arm_fk(eyes->arm, q, out->frame);
-    if (status != LW_OK)
-        return status;
-    lw_body_place(eyes->body, out->frame, &out->placed);
+    const enum lw_status status = lw_arm_fk(arm, q, out->frame);
+    if (status == LW_OK)
+        lw_body_place(body, out->frame, &out->placed);
+    return status;
+}
+
+double lw_surroundings_speed(const struct lw_surroundings *s, const struct lw_body *body, const double qd[LW_NJ])
+{
+    double fastest = 0;
+    struct lw_twist twist[LW_NJ];
+    lw_arm_twists(s->frame, qd, twist);
+    for (int i = 0; i < body->count; i++) {
+        // The ends of the axis bound all between them; the surface turns around it.
+        const struct lw_capsule *c = &s->placed.capsule[i];
+        const struct lw_twist *t = &twist[body->part[i].link - 1];
+        const double around = c->r * lw_vec_norm(t->angular);
+        for (int end = 0; end < 2; end++) {
+            double velocity[3];
+            lw_vec_cross(t->angular, end == 0 ? c->a : c->b, velocity);
+            lw_vec_add_scaled(1, t->at_base, velocity);
+            fastest = fmax(fastest, lw_vec_norm(velocity) + around);
+        }
+    }
+    return fastest;
+}
+
+void lw_surroundings_look(const struct lw_eyes *eyes, struct lw_surroundings *out)
+{
     const struct lw_near_query query = {.body = eyes->body,
                                         .placed = &out->placed,
                                         .world = eyes->world,
@@ -46,7 +73,6 @@ enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[L
     lw_near_range(&query, &out->near);
     lw_near_self(eyes->body, &out->placed, eyes->self_reach, &out->near);
     find_fixed(eyes->body, out);
-    return LW_OK;
 }
 
 void lw_surroundings_gradient(const struct lw_surroundings *s, const struct lw_body *body, const struct lw_near *pair,

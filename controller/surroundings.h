@@ -5,7 +5,7 @@
 // Frames   base frame of the arm.
 // Arrays   see arm/arm.h and collision/near.h.
 // Memory   the caller's; the struct is large and only its used part is written.
-// Errors   see lw_surroundings_look.
+// Errors   enum lw_status.
 #ifndef LW_CONTROLLER_SURROUNDINGS_H
 #define LW_CONTROLLER_SURROUNDINGS_H
 
@@ -18,7 +18,6 @@
 
 // What to look with.
 struct lw_eyes {
-    const struct lw_arm *arm;
     const struct lw_body *body;
     const struct lw_snapshot *world;
     int64_t time_ns;   // obstacles are where they are then
@@ -33,12 +32,20 @@ struct lw_surroundings {
     struct lw_near_list near;    // pairs within reach
 };
 
-// Looks around at a configuration. Pairs of shoulder or upper arm and an obstacle that the joints can bring no more than
-// 2 cm/rad nearer, within 5 cm, are marked as fixed: the arm and what it is mounted on.
+// Puts arm and body where a configuration has them.
 //   q  in  [6] rad
-// Fails LW_E_NOT_FINITE; *out is undefined then. Cost: that of the near pairs.
-LW_MUST_CHECK enum lw_status lw_surroundings_look(const struct lw_eyes *eyes, const double q[LW_NJ],
-                                                  struct lw_surroundings *out);
+// Fails LW_E_NOT_FINITE; *out is undefined then.
+LW_MUST_CHECK enum lw_status lw_surroundings_place(const struct lw_arm *arm, const struct lw_body *body,
+                                                   const double q[LW_NJ], struct lw_surroundings *out);
+
+// Speed (m/s) that no point of the body exceeds.
+//   qd  in  [6] rad/s
+double lw_surroundings_speed(const struct lw_surroundings *s, const struct lw_body *body, const double qd[LW_NJ]);
+
+// Looks around from where the body is. Pairs of shoulder or upper arm and an obstacle that the joints can bring no more
+// than 2 cm/rad nearer, within 5 cm, are marked as fixed: the arm and what it is mounted on. Cost: that of the near
+// pairs.
+void lw_surroundings_look(const struct lw_eyes *eyes, struct lw_surroundings *out);
 
 // Gradient of the distance of a near pair by the joint positions.
 //   gradient  out  [6] m/rad

@@ -90,32 +90,28 @@ static void select_request(const struct lw_controller *config, struct lw_control
 
 // --- look around ---
 
-// How far the guard has to see.
-static double brake_reach(const struct lw_controller *config, const struct lw_controller_state *state,
-                          const struct lw_tick_input *in)
+// Finds all that the law or the guard may have to know of. False when the configuration is no number.
+//   brake  out  how far the guard has to see
+static bool look(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
+                 struct lw_surroundings *around, struct lw_law_reach *brake)
 {
+    if (lw_surroundings_place(config->arm, &config->body, in->joint->q, around) != LW_OK)
+        return false;
+    const double speed = in->world->speed_max;
     const struct lw_guard_input motion = {
         .limits = &config->limits, .period_s = period_s(config), .velocity = state->velocity};
-    return lw_clearance_reach(&motion, &config->body, in->world->speed_max);
-}
-
-// Finds all that the law or the guard may have to know of. False when the configuration is no number.
-static bool look(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
-                 struct lw_surroundings *around)
-{
-    const double speed = in->world->speed_max;
     const struct lw_law_reach reach = config->law->reach(&config->params, speed);
-    const double brake = brake_reach(config, state, in);
-    const struct lw_eyes eyes = {.arm = config->arm,
-                                 .body = &config->body,
+    *brake = lw_clearance_reach(&motion, &config->body, around, speed);
+    const struct lw_eyes eyes = {.body = &config->body,
                                  .world = in->world,
                                  .time_ns = in->time_ns,
-                                 .reach = fmax(reach.obstacles, brake),
-                                 .self_reach = fmax(reach.self, brake),
+                                 .reach = fmax(reach.obstacles, brake->obstacles),
+                                 .self_reach = fmax(reach.self, brake->self),
                                  .warm = &state->warm};
     if (state->tick % LW_WARM_TICKS == 0)
         memset(&state->warm, 0, sizeof state->warm);
-    return lw_surroundings_look(&eyes, in->joint->q, around) == LW_OK;
+    lw_surroundings_look(&eyes, around);
+    return true;
 }
 
 // Whether the axis of a link is inside an obstacle, or the distances are not known: nothing to steer by.
@@ -190,20 +186,17 @@ static void escape(const struct lw_controller *config, struct lw_controller_stat
 // --- guard ---
 
 // The last word; a reason to brake replaces the law's wish by rest.
+//   rooms  in  count 0 where nothing is known
 static void guard(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
-                  const struct lw_surroundings *around, struct lw_joint_command *out)
+                  const struct lw_rooms *rooms, struct lw_joint_command *out)
 {
     static const double rest[LW_NJ] = {0};
-    struct lw_rooms rooms; // large: only its count is set
-    rooms.count = 0;
     const struct lw_guard_input guard_in = {.limits = &config->limits,
                                             .period_s = period_s(config),
                                             .q = in->joint->q,
                                             .velocity = state->velocity,
                                             .wish = out->flags ? rest : out->qd_law};
-    if (around != NULL)
-        lw_clearance_rooms(&config->limits, brake_reach(config, state, in), &config->body, around, &rooms);
-    out->flags |= lw_clearance_command(&guard_in, &rooms, out->qd);
+    out->flags |= lw_clearance_command(&guard_in, rooms, out->qd);
     out->mode = (out->flags & (LW_WAITING | LW_WARMING_UP)) ? LW_COMMAND_IDLE : LW_COMMAND_VELOCITY;
     memcpy(state->velocity, out->qd, sizeof state->velocity);
 }
@@ -214,13 +207,15 @@ void lw_tick(const struct lw_controller *config, struct lw_controller_state *sta
              struct lw_joint_command *out)
 {
     struct lw_surroundings around;
+    struct lw_law_reach brake;
+    struct lw_rooms rooms; // large, like the surroundings: only what is used is written
     *out = lw_explain_nothing();
     state->tick++;
 
     estimate(config, state, in);
     select_request(config, state, in->request);
     out->flags = brake_reasons(config, state, in);
-    const bool seen = look(config, state, in, &around);
+    const bool seen = look(config, state, in, &around, &brake);
     if (seen) {
         out->flags |= is_contact(config, &around) ? LW_CONTACT : 0u;
         ask_law(config, state, &around, out);
@@ -230,7 +225,10 @@ void lw_tick(const struct lw_controller *config, struct lw_controller_state *sta
         escape(config, state, in, &around, out);
     else
         lw_escape_pause(&state->escape);
-    guard(config, state, in, seen ? &around : NULL, out);
+    rooms.count = 0;
+    if (seen)
+        lw_clearance_rooms(&config->limits, brake, &config->body, &around, &rooms);
+    guard(config, state, in, &rooms, out);
     lw_explain_inputs(config, state, in, out);
 }
 

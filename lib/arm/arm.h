@@ -58,6 +58,15 @@ void lw_arm_point_jacobian(const struct lw_pose frame[LW_NJ], int link, const do
 void lw_arm_point_effect(const struct lw_pose frame[LW_NJ], int link, const double point[3], const double n[3],
                          double effect[LW_NJ]);
 
+// Motion of a link: a point x of it moves with at_base + angular x x.
+struct lw_twist {
+    double at_base[3]; // m/s, of the point of the link, thought large, that is at the base origin
+    double angular[3]; // rad/s
+};
+
+// Motion of every link 1..6 at joint velocities qd [6] rad/s.
+void lw_arm_twists(const struct lw_pose frame[LW_NJ], const double qd[LW_NJ], struct lw_twist twist[LW_NJ]);
+
 // Forces on the links, summed per link: the input of lw_arm_joint_effect.
 struct lw_wrench {
     double force[LW_NJ][3];  // sum of F, link i+1

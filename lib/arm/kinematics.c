@@ -91,6 +91,19 @@ void lw_arm_point_effect(const struct lw_pose frame[LW_NJ], int link, const doub
     }
 }
 
+void lw_arm_twists(const struct lw_pose frame[LW_NJ], const double qd[LW_NJ], struct lw_twist twist[LW_NJ])
+{
+    struct lw_twist sum = {{0}, {0}};
+    for (int j = 0; j < LW_NJ; j++) {
+        double axis[3], origin[3], at_base[3];
+        joint_axis(frame, j, axis, origin);
+        lw_vec_cross(origin, axis, at_base);
+        lw_vec_add_scaled(qd[j], axis, sum.angular);
+        lw_vec_add_scaled(qd[j], at_base, sum.at_base);
+        twist[j] = sum;
+    }
+}
+
 void lw_wrench_add(struct lw_wrench *wrench, int link, const double point[3], const double force[3])
 {
     double moment[3];

@@ -210,9 +210,9 @@ static void step(const struct scene_of_balls *s, double qd[LW_NJ], struct lw_nea
         assert_int_equal(lw_snapshot_add(&world, 10 + k, 1, &ball, &pose, NULL), LW_OK);
     }
     lw_snapshot_end(&world);
-    const struct lw_eyes eyes = {
-        .arm = lw_arm_get(s->robot), .body = &body, .world = &world, .reach = s->law.apf.rho_rep};
-    assert_int_equal(lw_surroundings_look(&eyes, s->q, &around), LW_OK);
+    const struct lw_eyes eyes = {.body = &body, .world = &world, .reach = s->law.apf.rho_rep};
+    assert_int_equal(lw_surroundings_place(lw_arm_get(s->robot), &body, s->q, &around), LW_OK);
+    lw_surroundings_look(&eyes, &around);
     const struct lw_law_input in = {.around = &around, .body = &body, .goal = s->goal, .circulation = no_circulation};
     lw_law_get(LW_LAW_APF)->step(&s->law, &in, qd);
     const struct lw_near_query all = {.body = &body, .placed = &around.placed, .world = &world, .d_max = HUGE_VAL};

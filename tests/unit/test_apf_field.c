@@ -34,9 +34,9 @@ static struct lw_law_params params(int gamma)
 static void look(const struct lw_law_params *law, const double q[LW_NJ])
 {
     const struct lw_law_reach reach = lw_apf_law.reach(law, world.speed_max);
-    const struct lw_eyes eyes = {
-        .arm = lw_arm_get(LW_UR5), .body = &body, .world = &world, .reach = reach.obstacles, .self_reach = reach.self};
-    assert_int_equal(lw_surroundings_look(&eyes, q, &around), LW_OK);
+    const struct lw_eyes eyes = {.body = &body, .world = &world, .reach = reach.obstacles, .self_reach = reach.self};
+    assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &body, q, &around), LW_OK);
+    lw_surroundings_look(&eyes, &around);
 }
 
 static double closing(const struct lw_near *pair)

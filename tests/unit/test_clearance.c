@@ -7,6 +7,7 @@
 // Memory   static where results are large.
 // Errors   cmocka's.
 #include "arm/joint.h" // enum lw_flag
+#include "base/vec.h"  // lw_vec_*
 #include "controller/clearance.h"
 #include "helpers.h"
 
@@ -186,34 +187,79 @@ static void acceleration_limits_do_not_carry_it_into_the_wall(void **state)
         assert_near(command[j], expected[j], 1e-12);
 }
 
+// No point of the body is faster than its speed says, and some point is nearly as fast: points on all axes, found by
+// moving the joints a little.
+static void the_speed_is_that_of_the_fastest_point(void **state)
+{
+    (void)state;
+    struct random random = {75};
+    static struct lw_surroundings here, there;
+    static struct lw_body body;
+    lw_body_make(LW_UR10, LW_BODY_CAPSULES_FINE, NULL, &body);
+    const double h = 1e-7;
+    for (int n = 0; n < 500; n++) {
+        double q[LW_NJ], qd[LW_NJ], later[LW_NJ], fastest = 0, thickest = 0;
+        random_fill(&random, -3, 3, q, LW_NJ);
+        random_fill(&random, -2, 2, qd, LW_NJ);
+        for (int j = 0; j < LW_NJ; j++)
+            later[j] = q[j] + h * qd[j];
+        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR10), &body, q, &here), LW_OK);
+        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR10), &body, later, &there), LW_OK);
+        for (int i = 0; i < body.count; i++) {
+            double a[3], b[3];
+            lw_vec_sub(there.placed.capsule[i].a, here.placed.capsule[i].a, a);
+            lw_vec_sub(there.placed.capsule[i].b, here.placed.capsule[i].b, b);
+            fastest = fmax(fastest, fmax(lw_vec_norm(a), lw_vec_norm(b)) / h);
+            thickest = fmax(thickest, body.part[i].capsule.r);
+        }
+        double turning = 0;
+        for (int j = 0; j < LW_NJ; j++)
+            turning += fabs(qd[j]);
+        const double speed = lw_surroundings_speed(&here, &body, qd);
+        assert_true(speed >= fastest - 1e-5);
+        assert_true(speed <= fastest + thickest * turning + 1e-5);
+    }
+}
+
 // The reach covers every room that could cut the fastest motion possible in the next tick.
 static void the_reach_covers_what_could_matter(void **state)
 {
     (void)state;
     struct random random = {74};
     static struct lw_body body;
+    static struct lw_surroundings here;
     lw_body_make(LW_UR10, LW_BODY_CAPSULES, NULL, &body);
     for (int n = 0; n < 2000; n++) {
         const struct lw_limits l = limits(random_in(&random, 1, 30));
         const double obstacle = random_in(&random, 0, 1);
-        double velocity[LW_NJ], next[LW_NJ];
+        double q[LW_NJ], velocity[LW_NJ], next[LW_NJ];
+        random_fill(&random, -3, 3, q, LW_NJ);
         random_fill(&random, -2, 2, velocity, LW_NJ);
         for (int j = 0; j < LW_NJ; j++)
-            next[j] = fmin(fabs(velocity[j]) + l.acceleration[j] * period_s, l.velocity[j]);
+            next[j] = velocity[j] + random_in(&random, -1, 1) * l.acceleration[j] * period_s;
+        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR10), &body, q, &here), LW_OK);
         const struct lw_guard_input in = {.limits = &l, .period_s = period_s, .velocity = velocity};
-        const double reach = lw_clearance_reach(&in, &body, obstacle);
+        const struct lw_law_reach reach = lw_clearance_reach(&in, &body, &here, obstacle);
+        // Something straight ahead of any point of the surface, coming at full speed.
         static struct lw_rooms rooms = {.count = 1};
-        rooms.room[0].room = reach - l.clearance;
+        const int part = random_below(&random, body.count);
+        double ahead[3], point[3];
+        random_fill(&random, -1, 1, ahead, 3);
+        const double length = lw_vec_norm(ahead);
+        for (int i = 0; i < 3; i++) {
+            ahead[i] /= -length;
+            point[i] = here.placed.capsule[part].b[i] - body.part[part].capsule.r * ahead[i];
+        }
+        rooms.room[0].room = reach.obstacles - l.clearance;
         rooms.room[0].approach = obstacle;
-        for (int j = 0; j < LW_NJ; j++)
-            rooms.room[0].gradient[j] = next[j] > 0 ? -body.lever[j] : 0;
+        lw_arm_point_effect(here.frame, body.part[part].link, point, ahead, rooms.room[0].gradient);
         assert_near(lw_clearance_part(&l, period_s, &rooms, next), 1, 1e-12);
     }
     struct lw_limits off = limits(8);
     off.clearance = HUGE_VAL;
     const double velocity[LW_NJ] = {1};
     const struct lw_guard_input in = {.limits = &off, .period_s = period_s, .velocity = velocity};
-    assert_near(lw_clearance_reach(&in, &body, 1), 0, 0);
+    assert_near(lw_clearance_reach(&in, &body, &here, 1).obstacles, 0, 0);
 }
 
 int main(void)
@@ -223,6 +269,7 @@ int main(void)
                                        cmocka_unit_test(a_wall_is_never_reached_and_always_approached),
                                        cmocka_unit_test(without_rooms_nothing_changes),
                                        cmocka_unit_test(acceleration_limits_do_not_carry_it_into_the_wall),
+                                       cmocka_unit_test(the_speed_is_that_of_the_fastest_point),
                                        cmocka_unit_test(the_reach_covers_what_could_matter)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

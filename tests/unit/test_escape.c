@@ -88,15 +88,15 @@ static void go(struct rig *rig)
 {
     const double period_s = (double)rig->period_ns * 1e-9;
     const struct lw_guard_input motion = {.limits = &rig->limits, .period_s = period_s, .velocity = rig->velocity};
-    const double reach = fmax(rig->params.apf.rho_rep, lw_clearance_reach(&motion, &rig->body, 0));
-    const struct lw_eyes eyes = {.arm = lw_arm_get(LW_UR5),
-                                 .body = &rig->body,
+    double wish[LW_NJ], command[LW_NJ], to_goal[3];
+    assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &rig->body, rig->q, &around), LW_OK);
+    const struct lw_law_reach reach = lw_clearance_reach(&motion, &rig->body, &around, 0);
+    const struct lw_eyes eyes = {.body = &rig->body,
                                  .world = &world,
                                  .time_ns = rig->time_ns,
-                                 .reach = reach,
-                                 .self_reach = reach};
-    double wish[LW_NJ], command[LW_NJ], to_goal[3];
-    assert_int_equal(lw_surroundings_look(&eyes, rig->q, &around), LW_OK);
+                                 .reach = fmax(rig->params.apf.rho_rep, reach.obstacles),
+                                 .self_reach = reach.self};
+    lw_surroundings_look(&eyes, &around);
     const double *tip = around.frame[LW_NJ - 1].p;
     const struct lw_law_input in = {
         .around = &around, .body = &rig->body, .goal = rig->goal, .circulation = rig->escape.circulation};
