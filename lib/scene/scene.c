@@ -38,9 +38,7 @@ static void resolve(struct lw_scene *scene)
 {
     if (scene->plant.rate_hz == 0)
         scene->plant.rate_hz = scene->rate_hz;
-    for (int i = 0; i < scene->obstacle_count; i++)
-        if (scene->obstacle[i].id == 0)
-            scene->obstacle[i].id = i + 1;
+    lw_scene_obstacles_resolve(scene);
 }
 
 static enum lw_status check_start(const struct lw_scene *scene, const struct lw_source *source, struct lw_error *error)
@@ -88,17 +86,6 @@ static enum lw_status check_rates(const struct lw_scene *scene, const struct lw_
     return LW_OK;
 }
 
-static enum lw_status check_obstacles(const struct lw_scene *scene, const struct lw_source *source,
-                                      struct lw_error *error)
-{
-    for (int i = 0; i < scene->obstacle_count; i++)
-        for (int k = 0; k < i; k++)
-            if (scene->obstacle[i].id == scene->obstacle[k].id)
-                return refuse(error, source, "obstacles.%d.id: expected a number of its own, found %d again", i,
-                              scene->obstacle[i].id);
-    return LW_OK;
-}
-
 // The robot decides the defaults, so it is read before everything else.
 static enum lw_status read_robot(const struct lw_source *source, enum lw_robot *robot, struct lw_error *error)
 {
@@ -124,7 +111,7 @@ enum lw_status lw_scene_read(const struct lw_source *source, struct lw_scene *sc
     if (status == LW_OK)
         status = check_rates(&next, source, error);
     if (status == LW_OK)
-        status = check_obstacles(&next, source, error);
+        status = lw_scene_obstacles_check(&next, source, error);
     if (status == LW_OK)
         *scene = next;
     return status;
@@ -206,8 +193,8 @@ int64_t lw_scene_period_ns(double rate_hz)
 
 void lw_scene_obstacles(const struct lw_scene *scene, struct lw_obstacle_change *change)
 {
-    *change = (struct lw_obstacle_change){.op = LW_REPLACE, .count = scene->obstacle_count};
-    for (int i = 0; i < scene->obstacle_count; i++) {
+    *change = (struct lw_obstacle_change){.op = LW_REPLACE};
+    for (int i = 0; i < scene->obstacle_count && change->count < LW_CHANGE_MAX; i++, change->count++) {
         const struct lw_scene_obstacle *from = &scene->obstacle[i];
         change->obstacle[i] = (struct lw_obstacle){
             .id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .quat = {1}, .radius = from->radius};

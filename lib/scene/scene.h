@@ -9,10 +9,11 @@
 #ifndef LW_SCENE_SCENE_H
 #define LW_SCENE_SCENE_H
 
-#include "arm/arm.h"            // LW_NJ, enum lw_robot
-#include "base/schema.h"        // struct lw_error, struct lw_key
-#include "collision/body.h"     // enum lw_body_model, struct lw_tool
-#include "collision/obstacle.h" // LW_CHANGE_MAX, struct lw_obstacle_change
+#include "arm/arm.h"               // LW_NJ, enum lw_robot
+#include "base/schema.h"           // struct lw_error, struct lw_key
+#include "collision/body.h"        // enum lw_body_model, struct lw_tool
+#include "collision/obstacle.h"    // LW_CHANGE_MAX, struct lw_obstacle_change
+#include "scene/scene_obstacles.h" // struct lw_scene_obstacle, struct lw_sensor_config, struct lw_scene_tool
 
 #include <stdint.h> // int64_t
 
@@ -65,12 +66,6 @@ struct lw_law_params {
     struct lw_remedy_params remedy;
 };
 
-struct lw_scene_obstacle {
-    int id;        // 0 in a file = place in the list, from 1
-    double at[3];  // m
-    double radius; // m
-};
-
 struct lw_scene {
     int robot; // enum lw_robot
     double rate_hz;
@@ -79,10 +74,15 @@ struct lw_scene {
     struct lw_limits limits;
     struct lw_plant_config plant;
     struct lw_law_params law;
-    double goal[3];      // m
-    struct lw_tool tool; // on the flange
+    double goal[3];                 // m
+    int seed;                       // of everything that is drawn
+    struct lw_scene_tool tool_told; // as a file tells it
+    struct lw_tool tool;            // on the flange, made of that
+    struct lw_sensor_config sensor;
     int obstacle_count;
-    struct lw_scene_obstacle obstacle[LW_CHANGE_MAX];
+    struct lw_scene_obstacle obstacle[LW_SCENE_OBSTACLES];
+    int number_count;
+    double number[LW_SCENE_NUMBERS]; // of all struct lw_rows
 };
 
 // Leeway's defaults for a robot: the values of every key that a scene leaves out.

@@ -88,15 +88,6 @@ static const struct lw_key request_keys[] = {
     {.name = "goal", WORKSPACE, AT(goal), .required = true, .help = "target of the tip"},
     {.name = NULL}};
 
-#define OF_OBSTACLE(field) .offset = offsetof(struct lw_scene_obstacle, field)
-static const struct lw_key obstacle_keys[] = {
-    {.name = "id", .kind = LW_INTEGER, OF_OBSTACLE(id), .min = 0, .max = 1e9,
-     .help = "unique number; 0 or left out = place in the list, from 1"},
-    {.name = "at", WORKSPACE, OF_OBSTACLE(at), .required = true, .help = "centre"},
-    {.name = "radius", .kind = LW_NUMBER, OF_OBSTACLE(radius), .min = 0, .max = 100, .unit = "m",
-     .help = "0 = a point"},
-    {.name = NULL}};
-
 static const struct lw_key scene_keys[] = {
     {.name = "robot", CHOICE(robot_names), AT(robot), .required = true, .help = "arm"},
     {.name = "rate_hz", RATE, .min = 1, AT(rate_hz), .help = "rate of the controller"},
@@ -107,8 +98,14 @@ static const struct lw_key scene_keys[] = {
     {.name = "plant", .kind = LW_SECTION, .keys = plant_keys, .help = "simulated arm"},
     {.name = "law", .kind = LW_SECTION, .keys = law_keys, .help = "what moves the arm"},
     {.name = "request", .kind = LW_SECTION, .keys = request_keys, .help = "what the arm is asked to do"},
-    {.name = "obstacles", .kind = LW_LIST, AT(obstacle), .count = LW_CHANGE_MAX, .keys = obstacle_keys,
+    {.name = "seed", .kind = LW_INTEGER, .min = 0, .max = 1e9, AT(seed),
+     .help = "of everything that is drawn: noise, random motion"},
+    {.name = "tool", .kind = LW_SECTION, .keys = lw_scene_tool_keys, .help = "what the flange carries"},
+    {.name = "sensor", .kind = LW_SECTION, .keys = lw_scene_sensor_keys,
+     .help = "how the simulator's sensor reports obstacles"},
+    {.name = "obstacles", .kind = LW_LIST, AT(obstacle), .count = LW_SCENE_OBSTACLES, .keys = lw_scene_obstacle_keys,
      .stride = sizeof(struct lw_scene_obstacle), .count_offset = offsetof(struct lw_scene, obstacle_count),
+     .line_offset = offsetof(struct lw_scene_obstacle, line),
      .help = "what the simulator's sensor reports on the bus"},
     {.name = NULL}};
 
@@ -156,5 +153,6 @@ struct lw_scene lw_scene_defaults(enum lw_robot robot)
     // The plant holds the guard's limit too: after a lost command it does not make up for it in one step.
     fill(scene.limits.acceleration, 8);
     fill(scene.plant.acceleration, 8);
+    lw_scene_obstacles_defaults(&scene);
     return scene;
 }
