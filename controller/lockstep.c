@@ -23,6 +23,7 @@ struct lockstep {
     struct lw_snapshot seen; // the world as the tick sees it
     struct lw_request request;
     struct lw_request_memory requests; // those put into `request`
+    struct lw_controller_state before; // the last tick
     union lw_message command;          // last one sent
     int64_t plant_session;             // of the state it answers
     int64_t plant_tick;
@@ -32,19 +33,31 @@ static void tick(struct lockstep *l, const struct lw_joint_state *joint)
 {
     const struct lw_tick_input in = {
         .time_ns = joint->tick * joint->period_ns, .joint = joint, .world = &l->seen, .request = &l->request};
+    l->before = l->control->state;
     lw_tick(&l->control->config, &l->control->state, &in, &l->command.joint_command);
     l->plant_session = joint->stamp.session;
     l->plant_tick = joint->tick;
 }
 
-// A state that comes again was sent again because its answer got lost: it gets the same answer.
+// Whether the last command was computed with the newest message about obstacles.
+static bool knows_world(const struct lockstep *l)
+{
+    const struct lw_joint_command *command = &l->command.joint_command;
+    return command->world.session == l->world.last.session && command->world.seq == l->world.last.seq &&
+           command->world_channel == l->world.last_channel;
+}
+
+// A state that comes again was sent again because its answer got lost: it gets the same answer. When obstacles came
+// in between, which had got lost or were not yet all told, its tick is taken back and done with them.
 static void on_joint_state(struct lockstep *l, const struct lw_joint_state *joint)
 {
     if (joint->tick % lw_scene_plant_ratio(&l->control->program->scene) != 0)
         return;
     const bool answered = joint->stamp.session == l->plant_session && joint->tick == l->plant_tick &&
                           l->command.joint_command.mode == LW_COMMAND_VELOCITY;
-    if (!answered)
+    if (answered && !knows_world(l))
+        l->control->state = l->before;
+    if (!answered || !knows_world(l))
         tick(l, joint);
     if (lw_bus_publish(l->bus, LW_CHANNEL_JOINT_COMMAND, &l->command) != LW_OK)
         lw_program_say(l->control->program, "a command could not be sent; the plant asks again");

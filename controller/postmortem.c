@@ -61,7 +61,7 @@ static int64_t newest_seq(const struct lw_world *world, int64_t owner)
 {
     for (int i = 0; i < LW_SENDERS_MAX; i++)
         if (world->sender[i].session == owner)
-            return world->sender[i].seq;
+            return world->sender[i].seq[LW_WORLD_OBSTACLES];
     return 1;
 }
 

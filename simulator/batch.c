@@ -9,8 +9,9 @@
 #include "simulator/batch.h"
 
 #include "base/clock.h"      // LW_NS_PER_S
-#include "collision/world.h"  // lw_world_apply
+#include "collision/world.h" // lw_world_apply
 #include "controller/tick.h" // lw_tick
+#include "scene/sensor.h"    // lw_sensor_*
 #include "simulator/plant.h" // lw_plant_step
 
 #include <stdlib.h> // calloc
@@ -41,28 +42,35 @@ struct run {
     struct lw_controller_state state;
     struct lw_plant plant;
     struct lw_plant_state arm;
+    struct lw_sensor sensor;
+    int64_t told; // messages of it
     struct lw_world world;
     struct lw_snapshot seen; // the world as the tick sees it
 };
 
-// The world as the bus would have brought it.
-static enum lw_status tell_obstacles(struct run *run, const struct lw_scene *scene)
+// Takes in what the sensor tells at a time of motion.
+static enum lw_status hear(struct run *run, int64_t now_ns)
 {
+    enum lw_status status = LW_OK;
+    if (!lw_sensor_look(&run->sensor, now_ns))
+        return LW_OK;
     struct lw_obstacle_change change;
-    lw_scene_obstacles(scene, &change);
-    change.stamp = (struct lw_stamp){.session = PLANT_SESSION, .seq = 1};
-    const enum lw_status status = lw_world_apply(&run->world, &change);
+    for (int i = 0; status == LW_OK && lw_sensor_tell(&run->sensor, now_ns, i, &change); i++) {
+        change.stamp = (struct lw_stamp){.session = PLANT_SESSION, .seq = ++run->told};
+        status = lw_world_apply(&run->world, &change);
+    }
     if (status == LW_OK)
         lw_world_build(&run->world, &run->seen);
     return status;
 }
 
 // One controller period.
-static void step(struct run *run, int64_t k, int ratio, struct lw_joint_command *command)
+static enum lw_status step(struct run *run, int64_t k, int ratio, struct lw_joint_command *command)
 {
     static const struct lw_request no_request = {0};
     struct lw_joint_state joint;
     const int64_t now_ns = run->arm.tick * run->plant.period_ns;
+    const enum lw_status status = hear(run, now_ns);
     lw_plant_report(&run->plant, &run->arm, &joint);
     joint.stamp.seq = k + 1;
     const struct lw_tick_input in = {.time_ns = now_ns, .joint = &joint, .world = &run->seen, .request = &no_request};
@@ -71,6 +79,7 @@ static void step(struct run *run, int64_t k, int ratio, struct lw_joint_command 
     lw_plant_obey(&run->arm, command, now_ns);
     for (int i = 0; i < ratio; i++)
         lw_plant_step(&run->plant, &run->arm, run->arm.tick * run->plant.period_ns);
+    return status;
 }
 
 enum lw_status lw_batch_run(const struct lw_scene *scene, const struct lw_batch_result *result)
@@ -79,15 +88,13 @@ enum lw_status lw_batch_run(const struct lw_scene *scene, const struct lw_batch_
     if (run == NULL)
         return LW_E_FULL;
     enum lw_status status = lw_controller_init(&run->config, &run->state, scene, CONTROLLER_SESSION);
-    if (status == LW_OK) {
-        lw_plant_init(&run->plant, &run->arm, scene, PLANT_SESSION);
-        status = tell_obstacles(run, scene);
-    }
+    lw_plant_init(&run->plant, &run->arm, scene, PLANT_SESSION);
+    lw_sensor_init(&run->sensor, scene);
     const int64_t steps = lw_scene_steps(scene);
     const int ratio = lw_scene_plant_ratio(scene);
     for (int64_t k = 0; status == LW_OK && k <= steps; k++) {
         struct lw_joint_command command;
-        step(run, k, ratio, &command);
+        status = step(run, k, ratio, &command);
         store(result, k, &run->config, &command);
     }
     free(run);

@@ -2,7 +2,7 @@
 // Live: the plant at its own fixed rate. Threads hand over by a mailbox and a ring; nothing else is shared:
 //   rt     (FIFO P)    sleeps to its deadline, steps the plant, publishes the state on a connection of its own
 //   rx     (FIFO P-1)  commands, judged by the gate
-//   sensor (normal)    obstacles at 10 Hz as a perception source would
+//   sensor (normal)    obstacles as a perception source tells them, at the time of motion of the newest step
 //   main   (normal)    statistics, PLANT_STATUS and SCENE, words for people, signals
 //
 // Units    ns of CLOCK_MONOTONIC.
@@ -21,7 +21,10 @@
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
-enum { POLL_MS = 50, OBSTACLE_POLLS = 2 };
+enum { POLL_MS = 50 };
+static const int64_t poll_ns = POLL_MS * INT64_C(1000000);
+static const int64_t tell_pause_ns = 1000 * 1000;
+enum { TELL_MAX = 16 }; // messages before a pause: a receive buffer of Linux's default size holds 90
 static const int64_t report_period_ns = LW_NS_PER_S / 20;
 static const int64_t warm_up_ns = LW_NS_PER_S / 2;
 
@@ -32,11 +35,20 @@ struct arrival {
     struct lw_lease lease;
 };
 
+// A step of the plant, and when it was.
+struct moment {
+    int64_t tick;
+    int64_t time_ns;
+};
+
 struct live {
     struct lw_simulation *simulation;
     struct lw_bus *rt_bus, *rx_bus, *main_bus;
     struct lw_mailbox command_box; // rx -> rt: struct arrival
     _Alignas(LW_CACHE_LINE) struct arrival command_slots[LW_MAILBOX_SLOTS];
+    struct lw_mailbox moment_box; // rt -> sensor: struct moment
+    _Alignas(LW_CACHE_LINE) struct moment moment_slots[LW_MAILBOX_SLOTS];
+    struct lw_sensor sensor;       // sensor
     struct lw_health health;       // rt -> main
     struct lw_gate gate;           // rt -> rx: set before the first state
     struct lw_lease lease;         // rx
@@ -122,6 +134,9 @@ static void step(struct loop *loop)
     loop->record.warm = loop->record.time_ns - loop->start_ns > warm_up_ns;
     obey(loop);
     lw_plant_step(&s->plant, &s->arm, loop->record.time_ns);
+    struct moment *moment = lw_mailbox_slot(&loop->live->moment_box);
+    *moment = (struct moment){.tick = s->arm.tick, .time_ns = loop->record.time_ns};
+    lw_mailbox_publish(&loop->live->moment_box);
     publish(loop);
 }
 
@@ -161,19 +176,45 @@ static void *run_plant(void *user)
 
 // --- sensor ---
 
+// Looks, and tells a sample that is new or due once more. A pause after each part lets receivers empty their buffers.
+// False when it was not sent.
+static bool tell(struct live *live, struct lw_bus *bus, int64_t *again_ns)
+{
+    bool fresh = false;
+    const struct moment *moment = lw_mailbox_take(&live->moment_box, &fresh);
+    const int64_t wake_ns = lw_clock_mono_ns();
+    const int64_t now_ns = moment->time_ns > 0 ? moment->time_ns : wake_ns; // 0: no step yet
+    const bool is_new = lw_sensor_look(&live->sensor, moment->tick * live->simulation->plant.period_ns);
+    if (!is_new && wake_ns < *again_ns)
+        return true;
+    *again_ns = wake_ns + live->sensor.period_ns;
+    struct lw_told told = {.count = 0};
+    struct lw_periodic pause = lw_periodic_start(wake_ns + tell_pause_ns, tell_pause_ns);
+    while (!told.all) {
+        if (lw_simulation_tell(&live->sensor, now_ns, TELL_MAX, bus, &told) != LW_OK)
+            return false;
+        if (!told.all)
+            (void)lw_periodic_wait(&pause);
+    }
+    return true;
+}
+
 static void *sense(void *user)
 {
     struct live *live = user;
     const struct lw_program *program = live->simulation->program;
     struct lw_bus *bus = NULL;
     bool failing = false;
+    int64_t again_ns = 0;
     if (lw_program_open(program, &bus) != LW_OK)
         atomic_store(&live->bus_failed, true);
-    struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), POLL_MS * INT64_C(1000000));
-    for (int poll = 0; !atomic_load(&live->rt_done) && !atomic_load(&live->bus_failed); poll++) {
-        if (poll % OBSTACLE_POLLS == 0)
-            lw_program_say_sent(program, "OBSTACLES", lw_simulation_publish_obstacles(live->simulation, bus) == LW_OK,
-                                &failing);
+    // Often enough for a sample not to wait, seldom enough to rest, and never so long that it keeps the program.
+    const int64_t look_ns = live->sensor.period_ns / 8;
+    struct lw_periodic loop = lw_periodic_start(lw_clock_mono_ns(), look_ns > poll_ns         ? poll_ns
+                                                                    : look_ns < tell_pause_ns ? tell_pause_ns
+                                                                                              : look_ns);
+    while (!atomic_load(&live->rt_done) && !atomic_load(&live->bus_failed)) {
+        lw_program_say_sent(program, "OBSTACLES", tell(live, bus, &again_ns), &failing);
         (void)lw_periodic_wait(&loop);
     }
     lw_bus_close(bus);
@@ -278,6 +319,8 @@ int lw_simulation_live(struct lw_simulation *simulation)
     struct lw_program *program = simulation->program;
     live.simulation = simulation;
     lw_mailbox_init(&live.command_box, live.command_slots, sizeof live.command_slots[0]);
+    lw_mailbox_init(&live.moment_box, live.moment_slots, sizeof live.moment_slots[0]);
+    lw_sensor_init(&live.sensor, &program->scene);
     if (!lw_program_go_realtime(program))
         return EXIT_FAILURE;
     int status = EXIT_FAILURE;

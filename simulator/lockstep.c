@@ -22,21 +22,33 @@ struct lockstep {
     struct lw_bus *bus;
     struct lw_gate gate;
     struct lw_lease lease;
+    struct lw_sensor sensor;
+    struct lw_told told;         // of the newest sample
+    bool echoed;                 // the message told last
     struct lw_joint_state state; // published last
-    bool answered;               // the state published last
+    bool answered;               // the state published last, by one who knows the whole sample
     bool started;                // a first answer came
     int64_t wanted_since;        // CLOCK_MONOTONIC when the state was published first
 };
 
-// Takes the answer to the state published last. The first one must also have seen the scene's obstacles.
+// Whether an answer was computed with the message told last.
+static bool is_echo(const struct lockstep *l, const struct lw_joint_command *command)
+{
+    return command->world.session == l->simulation->plant.session && command->world_channel == (int)l->told.channel &&
+           command->world.seq == l->told.seq;
+}
+
+// Takes the answer to the state published last, once the whole sample was told.
 static void on_command(void *user, enum lw_channel channel, const union lw_message *message)
 {
     (void)channel;
     struct lockstep *l = user;
     struct lw_simulation *s = l->simulation;
     const struct lw_joint_command *command = &message->joint_command;
-    const bool sees_world = l->started || command->world.session == s->plant.session;
-    if (l->answered || command->state_tick != s->arm.tick || !sees_world)
+    if (l->answered || command->state_tick != s->arm.tick)
+        return;
+    l->echoed |= is_echo(l, command);
+    if (!l->echoed || !l->told.all)
         return;
     const enum lw_verdict verdict = lw_gate_judge(&l->gate, &l->lease, command, l->state.stamp.seq, lw_clock_mono_ns());
     l->answered = lw_refusals_note(&s->program->refusals, verdict);
@@ -45,18 +57,25 @@ static void on_command(void *user, enum lw_channel channel, const union lw_messa
     l->started |= l->answered;
 }
 
+// Publishes the next message of the sample, if there is one, and the state. One message at a time: an answer says what
+// came last, and so whether it came.
 static enum lw_status publish(struct lockstep *l)
 {
+    const struct lw_simulation *s = l->simulation;
     enum lw_status status = LW_OK;
-    if (!l->started)
-        status = lw_simulation_publish_obstacles(l->simulation, l->bus);
-    return status == LW_OK ? lw_simulation_publish_state(l->simulation, l->bus, &l->state) : status;
+    if (!l->told.all) {
+        status = lw_simulation_tell(&l->sensor, s->arm.tick * s->plant.period_ns, 1, l->bus, &l->told);
+        l->echoed = false;
+    }
+    return status == LW_OK ? lw_simulation_publish_state(s, l->bus, &l->state) : status;
 }
 
-// Publishes the state until it is answered. False when stopped or given up.
+// Publishes what the sensor sees and the state until it is answered. False when stopped or given up.
 static bool ask(struct lockstep *l)
 {
     const struct lw_program *program = l->simulation->program;
+    if (lw_sensor_look(&l->sensor, l->simulation->arm.tick * l->simulation->plant.period_ns))
+        l->told = (struct lw_told){0};
     l->answered = false;
     l->wanted_since = lw_clock_mono_ns();
     int64_t publish_ns = l->wanted_since;
@@ -67,8 +86,11 @@ static bool ask(struct lockstep *l)
                             (double)l->simulation->arm.tick * l->simulation->plant.period_s);
             return false;
         }
-        // Again only after a while: other messages than the answer end the wait, too.
-        const bool due = now_ns >= publish_ns;
+        // Again, and from the start, only after a while: other messages than the answer end the wait, too.
+        const bool again = now_ns >= publish_ns && publish_ns > l->wanted_since;
+        if (again)
+            l->told = (struct lw_told){0};
+        const bool due = now_ns >= publish_ns || (l->echoed && !l->told.all);
         if (due)
             publish_ns = now_ns + resend_ns;
         if ((due && publish(l) != LW_OK) || !lw_bus_handle(l->bus, RESEND_MS)) {
@@ -117,6 +139,7 @@ int lw_simulation_lockstep(struct lw_simulation *simulation)
     lockstep.gate = lw_simulation_gate(simulation);
     lockstep.gate.open_ns = 0;
     lockstep.gate.max_lag = INT64_MAX;
+    lw_sensor_init(&lockstep.sensor, &program->scene);
     if (lw_program_open(program, &lockstep.bus) != LW_OK)
         return 1;
     bool ok = lw_program_subscribe(program, lockstep.bus, LW_CHANNEL_JOINT_COMMAND, on_command, &lockstep) == LW_OK;

@@ -15,7 +15,6 @@
 
 // A controller of the plant before must notice first that its plant is gone.
 static const int64_t start_guard_ns = LW_NS_PER_S / 4;
-
 struct lw_gate lw_simulation_gate(const struct lw_simulation *simulation)
 {
     const struct lw_plant *plant = &simulation->plant;
@@ -38,11 +37,20 @@ enum lw_status lw_simulation_publish_state(const struct lw_simulation *simulatio
     return status;
 }
 
-enum lw_status lw_simulation_publish_obstacles(const struct lw_simulation *simulation, struct lw_bus *bus)
+enum lw_status lw_simulation_tell(const struct lw_sensor *sensor, int64_t now_ns, int most, struct lw_bus *bus,
+                                  struct lw_told *told)
 {
     union lw_message message;
-    lw_scene_obstacles(&simulation->program->scene, &message.obstacles);
-    return lw_bus_publish(bus, LW_CHANNEL_OBSTACLES, &message);
+    enum lw_status status = LW_OK;
+    const int end = told->count + most;
+    while (status == LW_OK && told->count < end && lw_sensor_tell(sensor, now_ns, told->count, &message.obstacles)) {
+        told->channel = lw_change_channel(&message.obstacles);
+        status = lw_bus_publish(bus, told->channel == LW_WORLD_HULL ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES, &message);
+        told->seq = message.stamp.seq;
+        told->count += status == LW_OK;
+    }
+    told->all = !lw_sensor_tell(sensor, now_ns, told->count, &message.obstacles);
+    return status;
 }
 
 int main(int argc, char **argv)

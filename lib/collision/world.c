@@ -125,16 +125,17 @@ enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_c
 {
     struct lw_world next = *world;
     struct lw_sender *sender = find_sender(&next, change->stamp.session);
-    if (change->stamp.seq < sender->seq)
+    int64_t *newest = &sender->seq[lw_change_channel(change)];
+    if (change->stamp.seq < *newest)
         return LW_E_OLD;
-    if (change->stamp.seq == sender->seq) {
+    if (change->stamp.seq == *newest) {
         world->last = change->stamp;
         world->last_channel = (int)lw_change_channel(change);
         return LW_OK;
     }
     if (names_unknown_hull(world, change))
         return LW_E_UNKNOWN;
-    sender->seq = change->stamp.seq;
+    *newest = change->stamp.seq;
     bool changed = drop(&next, change) > 0;
 
     bool full = false;

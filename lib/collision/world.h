@@ -15,10 +15,10 @@
 
 enum { LW_REGISTRY_MAX = 256, LW_SENDERS_MAX = 32 };
 
-// Newest message of a sender.
+// Newest messages of a sender: its numbers count by channel.
 struct lw_sender {
     int64_t session;
-    int64_t seq;
+    int64_t seq[LW_WORLD_HULL + 1]; // by enum lw_world_channel
 };
 
 struct lw_world {

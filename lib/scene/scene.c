@@ -190,13 +190,3 @@ int64_t lw_scene_period_ns(double rate_hz)
 {
     return llround(1e9 / rate_hz);
 }
-
-void lw_scene_obstacles(const struct lw_scene *scene, struct lw_obstacle_change *change)
-{
-    *change = (struct lw_obstacle_change){.op = LW_REPLACE};
-    for (int i = 0; i < scene->obstacle_count && change->count < LW_CHANGE_MAX; i++, change->count++) {
-        const struct lw_scene_obstacle *from = &scene->obstacle[i];
-        change->obstacle[i] = (struct lw_obstacle){
-            .id = from->id, .p = {from->at[0], from->at[1], from->at[2]}, .quat = {1}, .radius = from->radius};
-    }
-}

@@ -12,7 +12,6 @@
 #include "arm/arm.h"               // LW_NJ, enum lw_robot
 #include "base/schema.h"           // struct lw_error, struct lw_key
 #include "collision/body.h"        // enum lw_body_model, struct lw_tool
-#include "collision/obstacle.h"    // LW_CHANGE_MAX, struct lw_obstacle_change
 #include "scene/scene_obstacles.h" // struct lw_scene_obstacle, struct lw_sensor_config, struct lw_scene_tool
 
 #include <stdint.h> // int64_t
@@ -116,8 +115,5 @@ int lw_scene_plant_ratio(const struct lw_scene *scene);
 
 // Nominal periods, ns, rounded.
 int64_t lw_scene_period_ns(double rate_hz);
-
-// The scene's obstacles as the message that a perception source would send (REPLACE).
-void lw_scene_obstacles(const struct lw_scene *scene, struct lw_obstacle_change *change);
 
 #endif

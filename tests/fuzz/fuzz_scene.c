@@ -10,6 +10,7 @@
 #define _GNU_SOURCE // open_memstream
 #include "fuzz.h"
 #include "scene/scene.h"
+#include "scene/sensor.h"           // lw_sensor_*
 #include "tests/unit/wire_ranges.h" // within
 
 #include <string.h> // strncmp
@@ -70,11 +71,18 @@ static void check_law(const struct lw_apf_params *apf)
     CHECK(apf->gamma == 1 || apf->gamma == 2);
 }
 
+// What is told of the scene is what the bus takes, at any time.
 static void check_obstacles(const struct lw_scene *s)
 {
-    struct lw_obstacle_change change;
-    lw_scene_obstacles(s, &change);
-    CHECK(obstacles_keep_their_ranges(&change));
+    static const int64_t times_ns[] = {0, 1, 40000000, 1234567890, 60000000000, 86400000000000};
+    static struct lw_sensor sensor;
+    lw_sensor_init(&sensor, s);
+    for (size_t k = 0; k < sizeof times_ns / sizeof times_ns[0]; k++) {
+        struct lw_obstacle_change change;
+        (void)lw_sensor_look(&sensor, times_ns[k]);
+        for (int i = 0; lw_sensor_tell(&sensor, times_ns[k], i, &change); i++)
+            CHECK(change.vertex_count > 0 ? hull_keeps_its_ranges(&change) : obstacles_keep_their_ranges(&change));
+    }
 }
 
 static void check_scene(const struct lw_scene *s)

@@ -22,7 +22,7 @@ static int64_t newest_of(const struct lw_world *world, int64_t session)
 {
     for (int i = 0; i < LW_SENDERS_MAX; i++)
         if (world->sender[i].session == session)
-            return world->sender[i].seq;
+            return world->sender[i].seq[LW_WORLD_OBSTACLES];
     return 0;
 }
 

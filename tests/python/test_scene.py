@@ -1,9 +1,11 @@
 """Scenes through Python: the same reader, the same messages."""
 
+import math
 import re
 import threading
 import time
 
+import numpy as np
 import pytest
 
 import leeway
@@ -32,10 +34,50 @@ def test_changed_copy_leaves_the_original(root):
 def test_obstacles_can_be_replaced(root):
     scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
     balls = [{"at": [0.5, 0.5, 0.5], "radius": 0.1}, {"id": 9, "at": [1, 0, 0]}]
+    rest = {
+        "shape": "sphere",
+        "velocity": [0, 0, 0],
+        "start_s": 0,
+        "visible_s": [0, math.inf],
+        "motion": {"kind": "none"},
+    }
     assert scene.with_({"obstacles": balls}).to_dict()["obstacles"] == [
-        {"id": 1, "at": [0.5, 0.5, 0.5], "radius": 0.1},
-        {"id": 9, "at": [1.0, 0.0, 0.0], "radius": 0.0},
+        {"id": 1, "at": [0.5, 0.5, 0.5], "radius": 0.1} | rest,
+        {"id": 9, "at": [1.0, 0.0, 0.0], "radius": 0.0} | rest,
     ]
+
+
+def test_obstacles_of_every_shape_come_back_with_their_own_keys(root):
+    scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+    there = {"kind": "waypoints", "waypoints": [[1, 0, 0]], "times_s": [2.5]}
+    obstacles = [
+        {"shape": "capsule", "at": [1, 0, 0], "radius": 0.1, "half_length": 0.5, "motion": there},
+        {"shape": "box", "at": [0, 1, 0], "half_extents": [0.1, 0.2, 0.3], "rpy_deg": [0, 0, 45]},
+        {"shape": "hull", "at": [0, 0, 1], "vertices": corners},
+        {"shape": "plane", "at": [0, 0, -1], "normal": [0, 1, 1]},
+    ]
+    capsule, box, hull, plane = scene.with_({"obstacles": obstacles}).to_dict()["obstacles"]
+    assert (capsule["half_length"], capsule["motion"]["times_s"]) == (0.5, [2.5])
+    assert capsule["motion"]["waypoints"] == [[1.0, 0.0, 0.0]]
+    assert (box["half_extents"], box["rpy_deg"]) == ([0.1, 0.2, 0.3], [0.0, 0.0, 45.0])
+    assert hull["vertices"] == corners.tolist()
+    assert plane["normal"] == [0.0, 1.0, 1.0]
+    assert "half_length" not in box
+    assert "radius" not in plane
+
+
+def test_a_tool_and_a_sensor_are_read(root):
+    tool = {"kind": "capsule", "a": [0, 0, 0], "b": [0, 0, 0.2], "radius": 0.03}
+    scene = leeway.load_scene(root / "scenarios" / "c1.yaml")
+    changed = scene.with_({"tool": tool, "sensor.noise_m": 0.002, "seed": 9}).to_dict()
+    assert (changed["tool"], changed["seed"]) == (tool, 9)
+    assert changed["sensor"] == {
+        "rate_hz": 10.0,
+        "noise_m": 0.002,
+        "latency_s": 0.0,
+        "valid_for_s": 2.0,
+    }
 
 
 def test_written_scene_reads_back_to_the_same_bits(root):
@@ -56,6 +98,9 @@ def test_written_scene_reads_back_to_the_same_bits(root):
         ("law.k_a", 0, "expected a number > 0"),
         ("q0", [0] * 5, "expected a list of 6 numbers"),
         ("q0", [0, 0, 0, 0, 0, 6.3], 'found "6.3"'),
+        ("obstacles.0.half_length", 1, "with shape capsule only, found sphere"),
+        ("obstacles", [{"at": [0, 0, 0], "shape": "hull", "vertices": [[0, 0]]}], "a list of 2"),
+        ("seed", 0.5, "expected an integer"),
     ],
 )
 def test_refusals_name_the_key(root, key, value, message):

@@ -228,22 +228,6 @@ static void obstacles_have_ids_of_their_own(void **state)
            "s.yaml: obstacles.2.id: expected a number of its own, found 5 again");
 }
 
-// A scene's obstacles are sent as the whole set of their source.
-static void obstacles_become_one_replace_message(void **state)
-{
-    (void)state;
-    const struct lw_scene scene = accept("obstacles=[{at: [1, 0, -2]}, {id: 9, at: [0, 2, 0], radius: 0.5}]");
-    struct lw_obstacle_change change;
-    memset(&change, 0x5a, sizeof change);
-    lw_scene_obstacles(&scene, &change);
-    assert_int_equal(change.op, LW_REPLACE);
-    assert_int_equal(change.count, 2);
-    assert_int_equal(change.obstacle[1].id, 9);
-    assert_near(change.obstacle[1].radius, 0.5, 0);
-    assert_all_near(change.obstacle[0].p, scene.obstacle[0].at, 3, 0);
-    assert_all_near(change.obstacle[1].p, scene.obstacle[1].at, 3, 0);
-}
-
 // --- numbers of a run ---
 
 static void steps_and_periods_are_rounded(void **state)
@@ -345,7 +329,6 @@ int main(void)
         cmocka_unit_test(the_timeout_spans_two_controller_periods),
         cmocka_unit_test(the_start_lies_in_ranges_that_are_not_empty),
         cmocka_unit_test(obstacles_have_ids_of_their_own),
-        cmocka_unit_test(obstacles_become_one_replace_message),
         cmocka_unit_test(steps_and_periods_are_rounded),
         cmocka_unit_test(every_scenario_loads),
         cmocka_unit_test(the_papers_cases_differ_in_rho_alone),

@@ -82,7 +82,7 @@ def select_motion(log: Log) -> Motion:
     plant, controller = _sessions(log)
     all_states = _in_order(log.states.take(log.states.session == plant))
     sent = _in_order(log.commands.take(log.commands.session == controller))
-    commands, resent = _of_motion(sent, all_states, controller)
+    commands, answers = _of_motion(sent, all_states, controller)
     new = np.flatnonzero(np.diff(commands.state_seq) > 0)
     end = int(new[-1]) + 2 if len(new) else 1
     before = sent.take(sent.tick < commands.tick[0])
@@ -93,7 +93,8 @@ def select_motion(log: Log) -> Motion:
     states = all_states.take(_moving_part(all_states, int(commands.state_tick[0])))
     ratio = max(1, int(np.median(np.diff(commands.state_tick)))) if end > 1 else 1
     post_mortem = _is_post_mortem(log)
-    losses = _losses(commands, all_states, ratio, post_mortem) | {"commands_sent_again": resent}
+    answers = answers.take(answers.seq <= commands.seq[-1])
+    losses = _losses(commands, answers, all_states, ratio, post_mortem)
     return Motion(
         commands=commands,
         states=states,
@@ -147,16 +148,19 @@ def _in_order(messages: MessagesT) -> MessagesT:
     return messages.take(np.unique(messages.seq, return_index=True)[1])
 
 
-def _of_motion(sent: Commands, states: States, controller: int) -> tuple[Commands, int]:
-    """Return the commands from the first accepted one on, one a tick; count those sent again."""
+def _of_motion(sent: Commands, states: States, controller: int) -> tuple[Commands, Commands]:
+    """Return the commands from the first accepted one on: the last of each tick, and all.
+
+    In lockstep a tick has several when its answer got lost, or when obstacles came late.
+    """
     accepted = states.command_seq[states.command_session == controller]
     first = int(accepted.min(initial=np.iinfo(np.int64).max))
     plant = sent.plant_session == states.session[0]
     commands = sent.take(plant & (sent.mode == VELOCITY) & (sent.seq >= first))
     if not len(commands):  # never obeyed, or the log begins after the last one that was
         commands = sent.take(plant & (sent.mode == VELOCITY))
-    once = commands.take(np.unique(commands.tick, return_index=True)[1])
-    return once, len(commands) - len(once)
+    _, from_end = np.unique(commands.tick[::-1], return_index=True)
+    return commands.take(len(commands) - 1 - from_end), commands
 
 
 def _moving_part(states: States, first_tick: int) -> NDArray[np.bool_]:
@@ -187,23 +191,26 @@ def _is_post_mortem(log: Log) -> bool:
     return only and silent and bool(np.isin(log.states.seq, log.commands.state_seq).all())
 
 
-def _losses(commands: Commands, states: States, ratio: int, post_mortem: bool) -> dict[str, int]:
+def _losses(
+    commands: Commands, answers: Commands, states: States, ratio: int, post_mortem: bool
+) -> dict[str, int]:
     """Count what is missing, by the messages' own numbers.
 
     A post-mortem log lacks the states that were not used, which is no loss; what they echoed is
-    not known.
+    not known. Of several answers of a tick, `answers`, the plant obeys one.
     """
-    used = np.diff(commands.state_seq)
+    again = len(answers) - len(commands)
     own = states.take(states.command_session == commands.session[0])
     passed = np.maximum(np.diff(own.command_seq) - 1, 0)
     if post_mortem:
         passed = passed[np.diff(own.seq) == 1]
     return {
-        "commands_not_in_log": _gaps(commands.seq),
+        "commands_not_in_log": _gaps(answers.seq),
         "states_not_in_log": 0 if post_mortem else _gaps(states.seq),
-        "states_not_used": int(np.maximum(used - ratio, 0).sum()),
-        "states_used_again": int((used == 0).sum()),
-        "commands_not_obeyed": int(passed.sum()),
+        "states_not_used": int(np.maximum(np.diff(answers.state_seq) - ratio, 0).sum()),
+        "states_used_again": int((np.diff(commands.state_seq) == 0).sum()),
+        "commands_not_obeyed": max(0, int(passed.sum()) - again),
+        "commands_sent_again": again,
     }
 
 
