@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import leeway
+from leeway import crowd
 
 
 def test_loads_from_path_and_from_text(root):
@@ -78,6 +79,14 @@ def test_a_tool_and_a_sensor_are_read(root):
         "latency_s": 0.0,
         "valid_for_s": 2.0,
     }
+
+
+def test_the_crowd_is_what_its_writer_writes(root):
+    assert (root / "scenarios" / "crowd.yaml").read_text() == crowd.write_crowd()
+    obstacles = leeway.load_scene(root / "scenarios" / "crowd.yaml").to_dict()["obstacles"]
+    assert len(obstacles) == crowd.COUNT
+    assert {o["shape"] for o in obstacles} == {*crowd.SHAPES, "plane"}
+    assert sum(o["motion"]["kind"] == "random" for o in obstacles) >= 19
 
 
 def test_written_scene_reads_back_to_the_same_bits(root):
