@@ -37,6 +37,10 @@ duration_s: 12
 seed: {seed}
 q0: {start}
 
+# A longer reach of the repulsion adds up over the crowd, and the arm stands still half way.
+law:
+  rho_rep: 0.1
+
 request:
   goal: {goal}
 
