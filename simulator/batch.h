@@ -13,11 +13,11 @@
 #include "scene/scene.h" // struct lw_scene
 
 struct lw_batch_result {
-    double *t;         // [rows] s
-    double *q;         // [rows][6] rad
-    double *qd;        // [rows][6] rad/s, commanded at q
-    double *tip;       // [rows][3] m
-    double *deviation; // [rows] m, tip to goal
+    double *t;              // [rows] s
+    double *q;              // [rows][6] rad
+    double *qd;             // [rows][6] rad/s, commanded at q
+    double *tip;            // [rows][3] m
+    double *deviation;      // [rows] m, tip to goal
     double *clearance;      // [rows] m, smallest, arm to obstacles; infinite without obstacles
     double *self_clearance; // [rows] m, smallest, of links watched against each other; infinite where none is near
     int *flags;             // [rows] set of enum lw_flag

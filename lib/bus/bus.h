@@ -23,9 +23,9 @@ struct lw_bus;
 
 // How to open a bus.
 struct lw_bus_config {
-    const char *url;  // NULL = LCM_DEFAULT_URL, else the default: multicast that stays on this host
-    const char *name; // robot's prefix of its channels (lw_wire_is_shared: the others); NULL = none
-    int64_t session;  // from lw_clock_session, one per process
+    const char *url;              // NULL = LCM_DEFAULT_URL, else the default: multicast that stays on this host
+    const char *name;             // robot's prefix of its channels (lw_wire_is_shared: the others); NULL = none
+    int64_t session;              // from lw_clock_session, one per process
     struct lw_refusals *refusals; // counts what handlers never see
     bool own_socket; // receives by bus/datagram.h, a socket a channel, in the handling thread, without LCM's threads;
                      // cannot publish
