@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Clouds of points and the farthest one in a direction. The only place with vector types: two doubles at once, what
-// every x86-64 and every 64-bit ARM has. The answer does not depend on the width: of equal points the first one counts.
+// Clouds of points and the farthest one in a direction. Vector types stand here and in cull.h alone: two doubles at
+// once, what every x86-64 and every 64-bit ARM has. The answer does not depend on the width: of equal points the first
+// one counts.
 //
 // Units    metres.
 // Frames   of the cloud.
