@@ -49,11 +49,20 @@ static void remember(const struct lw_simplex *simplex, const struct lw_shape *hu
     }
 }
 
+// Asks for the vertices now: they come while the search is set up.
+static void fetch(const struct lw_core_hull *hull)
+{
+    enum { LINE = 64 / sizeof(double) };
+    for (int i = 0; i < 3 * hull->padded; i += LINE)
+        __builtin_prefetch(hull->vertex + i);
+}
+
 static void link_to_hull(const struct lw_capsule *link, const struct lw_shape *hull, double d_max, struct lw_warm *warm,
                          struct lw_distance *out)
 {
     double p[2][3], ends[6];
     struct lw_simplex simplex;
+    fetch(&hull->hull);
     lw_vec_sub(link->a, hull->c, p[0]);
     lw_vec_sub(link->b, hull->c, p[1]);
     for (int k = 0; k < 3; k++) {
