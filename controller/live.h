@@ -3,7 +3,7 @@
 // nothing else is shared.
 //   rt     (FIFO P)    sleeps to its deadline, ticks, publishes on a connection of its own        realtime.c
 //   rx     (FIFO P-1)  joint states                                                               listen.c
-//   world  (normal)    obstacles and requests, merged into a snapshot; publishes WORLD            listen.c
+//   world  (normal)    obstacles and requests, merged into a snapshot; publishes WORLD            gather.c
 //   main   (normal)    statistics, STATUS and SCENE, signals                                      live.c
 //
 // Units    ns of CLOCK_MONOTONIC.
@@ -17,6 +17,7 @@
 #include "base/mailbox.h" // struct lw_mailbox
 #include "controller/control.h"
 #include "controller/postmortem.h" // struct lw_heard
+#include "controller/tell.h"       // struct lw_tell
 
 #include <stdatomic.h> // atomic_bool
 
@@ -40,7 +41,8 @@ struct lw_live {
     struct lw_heard heard;              // world -> main
     struct lw_postmortem postmortem;    // main
     struct lw_lease lease;              // rx: the plant heard
-    struct lw_world world;              // world: its working copy
+    struct lw_world world;              // world: all that was heard, merged
+    struct lw_tell tell;                // world: what is told of it
     atomic_int_fast64_t world_heard_ns; // world -> main: when the newest message about obstacles came, 0 = none
     struct lw_request_memory requests;  // world: those put into the mailbox
     atomic_bool stopping;               // main -> rt: brake, then end
@@ -54,7 +56,8 @@ void *lw_live_realtime(void *user);
 void *lw_live_receive(void *user);
 void *lw_live_world(void *user);
 
-// Subscribes what the two listening threads handle.
+// Subscribes what the two listening threads handle, or only the world thread.
 LW_MUST_CHECK enum lw_status lw_live_subscribe(struct lw_live *live);
+LW_MUST_CHECK enum lw_status lw_live_subscribe_world(struct lw_live *live);
 
 #endif

@@ -21,6 +21,8 @@ struct lockstep {
     struct lw_bus *bus;
     struct lw_world world;
     struct lw_snapshot seen; // the world as the tick sees it
+    bool changed;            // it is not the world any more
+    bool failed;
     struct lw_request request;
     struct lw_request_memory requests; // those put into `request`
     struct lw_controller_state before; // the last tick
@@ -29,8 +31,19 @@ struct lockstep {
     int64_t plant_tick;
 };
 
+// Every obstacle was checked when it came: a world that cannot be shown is none to go on with.
+static void look(struct lockstep *l)
+{
+    const enum lw_status status = l->changed ? lw_world_build(&l->world, &l->seen) : LW_OK;
+    if (status != LW_OK)
+        lw_program_fail(l->control->program, "obstacles: %s", lw_status_text(status));
+    l->failed |= status != LW_OK;
+    l->changed = false;
+}
+
 static void tick(struct lockstep *l, const struct lw_joint_state *joint)
 {
+    look(l);
     const struct lw_tick_input in = {
         .time_ns = joint->tick * joint->period_ns, .joint = joint, .world = &l->seen, .request = &l->request};
     l->before = l->control->state;
@@ -65,8 +78,8 @@ static void on_joint_state(struct lockstep *l, const struct lw_joint_state *join
 
 static void on_obstacles(struct lockstep *l, const struct lw_obstacle_change *change)
 {
-    if (lw_refusals_note(&l->control->program->refusals, lw_verdict_of(lw_world_apply(&l->world, change))))
-        lw_world_build(&l->world, &l->seen);
+    const enum lw_status status = lw_world_apply(&l->world, change);
+    l->changed |= lw_refusals_note(&l->control->program->refusals, lw_verdict_of(status));
 }
 
 static void on_message(void *user, enum lw_channel channel, const union lw_message *message)
@@ -82,8 +95,9 @@ static void on_message(void *user, enum lw_channel channel, const union lw_messa
 
 static enum lw_status subscribe(struct lockstep *l)
 {
-    static const enum lw_channel channels[] = {LW_CHANNEL_JOINT_STATE, LW_CHANNEL_OBSTACLES, LW_CHANNEL_HULL,
-                                               LW_CHANNEL_GOAL, LW_CHANNEL_STOP};
+    // States last: who asks for an answer has told of the obstacles before.
+    static const enum lw_channel channels[] = {LW_CHANNEL_OBSTACLES, LW_CHANNEL_HULL, LW_CHANNEL_GOAL, LW_CHANNEL_STOP,
+                                               LW_CHANNEL_JOINT_STATE};
     enum lw_status status = LW_OK;
     for (size_t i = 0; status == LW_OK && i < sizeof channels / sizeof channels[0]; i++)
         status = lw_program_subscribe(l->control->program, l->bus, channels[i], on_message, l);
@@ -103,7 +117,7 @@ static bool may_end(const struct lockstep *l, int64_t *heard_ns, int64_t *last_t
     return lw_stop_signal() != 0 && (stopped || quiet || lw_stop_count() > 1);
 }
 
-// Answers states until asked to stop and the arm was braked. False when the bus failed.
+// Answers states until asked to stop and the arm was braked. False when something failed.
 static bool serve(struct lockstep *l)
 {
     int64_t announce_ns = 0, heard_ns = 0, last_tick = 0;
@@ -111,10 +125,11 @@ static bool serve(struct lockstep *l)
         if (lw_stop_signal() != 0)
             l->request = lw_request_shutdown;
         lw_program_announce(l->control->program, l->bus, &announce_ns);
-        if (!lw_bus_handle(l->bus, POLL_MS)) {
+        const bool ok = lw_bus_handle(l->bus, POLL_MS);
+        if (!ok)
             lw_program_fail(l->control->program, "the bus failed");
+        if (!ok || l->failed)
             return false;
-        }
     }
     return true;
 }

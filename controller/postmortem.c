@@ -44,6 +44,15 @@ void lw_heard_note(struct lw_heard *heard, enum lw_channel channel, const union 
     pthread_mutex_unlock(&heard->lock);
 }
 
+// Only what is used: the world is large.
+static void copy_past(const struct lw_heard_past *from, struct lw_heard_past *to)
+{
+    lw_world_copy(&from->before, &to->before);
+    memcpy(to->newest, from->newest, (size_t)from->count * sizeof from->newest[0]);
+    to->count = from->count;
+    to->next = from->next;
+}
+
 // --- writing ---
 
 struct writer {
@@ -56,37 +65,43 @@ static void write_at(struct writer *w, enum lw_channel channel, const union lw_m
     lw_log_write(w->log, channel, message, time_ns / 1000 + w->utime_offset_us);
 }
 
-// Number of the newest message of an owner.
-static int64_t newest_seq(const struct lw_world *world, int64_t owner)
+// Number of the newest message of a sender on a channel, 0 = not known any more.
+static int64_t newest_seq(const struct lw_world *world, int64_t session, enum lw_world_channel channel)
 {
     for (int i = 0; i < LW_SENDERS_MAX; i++)
-        if (world->sender[i].session == owner)
-            return world->sender[i].seq[LW_WORLD_OBSTACLES];
-    return 1;
+        if (world->sender[i].session == session && world->sender[i].channel == (int)channel)
+            return world->sender[i].seq;
+    return 0;
 }
 
-// Obstacles from i on that one message can carry: those of one owner that follow one another.
-static int run_length(const struct lw_world *world, int i)
+// Messages that follow one of an owner on its channel, of the same.
+static int count_more(struct lw_tell *tell, const struct lw_world *world, const struct lw_obstacle_change *first)
 {
-    int n = 1;
-    while (n < LW_CHANGE_MAX && i + n < world->count && world->owner[i + n] == world->owner[i])
+    struct lw_obstacle_change next;
+    const int at = tell->next;
+    int n = 0;
+    while (lw_tell_next(tell, world, &next) && next.owner == first->owner &&
+           lw_change_channel(&next) == lw_change_channel(first))
         n++;
+    tell->next = at;
     return n;
 }
 
-// The obstacles known before the messages that follow, in their order; numbered so that an owner's next message is
-// newer.
-static void write_before(struct writer *w, const struct lw_world *world, int64_t time_ns)
+// The obstacles known before the messages that follow; numbered so that an owner's next message is newer.
+static void write_before(struct writer *w, struct lw_tell *tell, const struct lw_world *world, int64_t time_ns)
 {
-    for (int i = 0; i < world->count; i += run_length(world, i)) {
-        union lw_message message = {.obstacles = {.op = LW_UPSERT, .count = run_length(world, i)}};
-        struct lw_obstacle_change *change = &message.obstacles;
-        change->stamp.session = world->owner[i];
-        change->stamp.seq = newest_seq(world, change->stamp.session);
-        for (int k = i + change->count; k < world->count; k += run_length(world, k))
-            change->stamp.seq -= world->owner[k] == change->stamp.session;
-        memcpy(change->obstacle, &world->obstacle[i], (size_t)change->count * sizeof change->obstacle[0]);
-        write_at(w, LW_CHANNEL_OBSTACLES, &message, time_ns);
+    union lw_message message;
+    struct lw_obstacle_change *change = &message.obstacles;
+    int left = 0; // messages of this owner on this channel
+    lw_tell_begin(tell, world, 0);
+    while (lw_tell_next(tell, world, change)) {
+        const enum lw_world_channel channel = lw_change_channel(change);
+        left = left > 0 ? left : 1 + count_more(tell, world, change);
+        const int64_t newest = newest_seq(world, change->owner, channel);
+        change->stamp = (struct lw_stamp){.session = change->owner, .seq = (newest > left ? newest : left) - left + 1};
+        change->owner = 0;
+        left--;
+        write_at(w, channel == LW_WORLD_HULL ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES, &message, time_ns);
     }
 }
 
@@ -104,13 +119,14 @@ static int write_heard(struct writer *w, const struct lw_heard_past *heard, int 
 }
 
 // Every tick: its state when it is a new one, then its command.
-static void write_ticks(struct writer *w, const struct lw_health *health, const struct lw_heard_past *heard)
+static void write_ticks(struct writer *w, const struct lw_health *health, const struct lw_heard_past *heard,
+                        struct lw_tell *tell)
 {
     int back = 0, next = 0;
     while (lw_health_past(health, back) != NULL)
         back++;
     if (back > 0)
-        write_before(w, &heard->before, lw_health_past(health, back - 1)->time_ns);
+        write_before(w, tell, &heard->before, lw_health_past(health, back - 1)->time_ns);
     while (--back >= 0) {
         const struct lw_record *record = lw_health_past(health, back);
         next = write_heard(w, heard, next, record->time_ns);
@@ -150,11 +166,11 @@ static void write_file(struct lw_postmortem *postmortem, const struct lw_program
     if (status == LW_OK) {
         // A copy, so that the world thread need not wait for the disk: obstacles and STOP go on being heard.
         pthread_mutex_lock(&heard->lock);
-        postmortem->heard = heard->past;
+        copy_past(&heard->past, &postmortem->heard);
         pthread_mutex_unlock(&heard->lock);
         const struct lw_bus_scene scene = lw_program_scene(program);
         lw_log_write_scene(w.log, &scene, lw_clock_utime());
-        write_ticks(&w, health, &postmortem->heard);
+        write_ticks(&w, health, &postmortem->heard, &postmortem->tell);
         status = lw_log_close(w.log);
     }
     if (status == LW_OK)

@@ -11,6 +11,7 @@
 #define LW_CONTROLLER_POSTMORTEM_H
 
 #include "collision/world.h" // struct lw_world
+#include "controller/tell.h" // struct lw_tell
 #include "program/health.h"  // struct lw_health
 #include "program/program.h" // struct lw_program
 
@@ -47,6 +48,7 @@ struct lw_postmortem {
     int64_t due_ns;             // when: a moment later, so that the file shows what followed
     int64_t looked_ns;          // time of the newest tick looked at
     struct lw_heard_past heard; // copy that is written
+    struct lw_tell tell;        // of the obstacles in it
 };
 
 // Main thread, often: looks for new faults in the ticks since the last look, and writes the file when it is time.

@@ -59,9 +59,7 @@ static enum lw_status hear(struct run *run, int64_t now_ns)
         change.stamp = (struct lw_stamp){.session = PLANT_SESSION, .seq = ++run->told};
         status = lw_world_apply(&run->world, &change);
     }
-    if (status == LW_OK)
-        lw_world_build(&run->world, &run->seen);
-    return status;
+    return status == LW_OK ? lw_world_build(&run->world, &run->seen) : status;
 }
 
 // One controller period.

@@ -171,6 +171,14 @@ static bool take(struct lw_bus *bus, enum lw_channel channel, int timeout_ms)
     return got >= 0;
 }
 
+// Obstacles and hulls of a sender belong together: what came first goes first.
+static void keep_order(const struct lw_bus *bus, bool ready[LW_CHANNEL_COUNT])
+{
+    enum { A = LW_CHANNEL_OBSTACLES, B = LW_CHANNEL_HULL };
+    if (ready[A] && ready[B])
+        ready[lw_datagram_arrival_ns(&bus->datagram[A]) < lw_datagram_arrival_ns(&bus->datagram[B]) ? B : A] = false;
+}
+
 // One message of each channel at most, so that a flood on one does not keep the others waiting.
 static bool handle_datagrams(struct lw_bus *bus, int timeout_ms)
 {
@@ -187,8 +195,12 @@ static bool handle_datagrams(struct lw_bus *bus, int timeout_ms)
         return take(bus, channel[0], timeout_ms);
     const int ready = poll(wait, n, timeout_ms);
     bool ok = ready >= 0 || errno == EINTR; // a signal only ends the wait
+    bool waits[LW_CHANNEL_COUNT] = {false};
     for (nfds_t i = 0; ready > 0 && i < n; i++)
-        if (wait[i].revents != 0)
+        waits[channel[i]] = wait[i].revents != 0;
+    keep_order(bus, waits);
+    for (nfds_t i = 0; i < n; i++)
+        if (waits[channel[i]])
             ok &= take(bus, channel[i], 0);
     return ok;
 }

@@ -15,6 +15,7 @@
 #include <string.h>     // memcmp, strnlen, strerrordesc_np
 #include <sys/socket.h> // socket, bind, recv
 #include <sys/time.h>   // struct timeval
+#include <time.h>       // struct timespec
 #include <unistd.h>     // close
 
 // A short message: magic, sequence number of its sender, channel with NUL, payload.
@@ -93,6 +94,8 @@ static const char *set_up(int fd, const struct sockaddr_in *group, const char *c
     // The filter comes before bind, so that nothing foreign is ever queued.
     if (!set(fd, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program))
         return "the kernel takes no socket filter; raise net.core.optmem_max";
+    if (!set(fd, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on))
+        return "the kernel does not tell when packets come";
     if (!set(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on))
         return "the port cannot be shared";
     if (receive_bytes > 0 && !set(fd, SOL_SOCKET, SO_RCVBUF, &receive_bytes, sizeof receive_bytes))
@@ -184,6 +187,24 @@ static int after_error(struct lw_datagram *d)
         d->errors++;
         return ++d->errors_in_row < LW_DATAGRAM_ERRORS ? 0 : -1;
     }
+}
+
+int64_t lw_datagram_arrival_ns(const struct lw_datagram *d)
+{
+    union {
+        struct cmsghdr align;
+        unsigned char bytes[CMSG_SPACE(sizeof(struct timespec))];
+    } control;
+    unsigned char first;
+    struct iovec part = {.iov_base = &first, .iov_len = sizeof first};
+    struct msghdr head = {.msg_iov = &part, .msg_iovlen = 1, .msg_control = &control, .msg_controllen = sizeof control};
+    if (recvmsg(d->fd, &head, MSG_PEEK | MSG_DONTWAIT) <= 0)
+        return 0;
+    const struct cmsghdr *found = CMSG_FIRSTHDR(&head);
+    struct timespec when = {0};
+    if (found != NULL && found->cmsg_level == SOL_SOCKET && found->cmsg_type == SO_TIMESTAMPNS)
+        memcpy(&when, CMSG_DATA(found), sizeof when);
+    return when.tv_sec * INT64_C(1000000000) + when.tv_nsec;
 }
 
 int lw_datagram_receive(struct lw_datagram *d, int timeout_ms, const void **payload, uint32_t *size)

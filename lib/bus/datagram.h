@@ -59,6 +59,10 @@ void lw_datagram_close(struct lw_datagram *d);
 // use any more. Cost: one system call, one more when the wait is not that of the call before.
 LW_MUST_CHECK int lw_datagram_receive(struct lw_datagram *d, int timeout_ms, const void **payload, uint32_t *size);
 
+// When the message came that the next receive takes: ns of the system's clock, to compare with that of another socket.
+// 0 = there is none. Cost: one system call.
+int64_t lw_datagram_arrival_ns(const struct lw_datagram *d);
+
 // Finds the payload of a packet. False, outputs unchanged, unless it is a short LCM message of exactly this channel.
 bool lw_datagram_parse(const void *packet, size_t size, const char *channel, const void **payload,
                        uint32_t *payload_size);

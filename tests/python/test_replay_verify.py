@@ -162,7 +162,7 @@ def test_a_message_that_the_log_lacks(tmp_path: Path) -> None:
     r.tick(5)
     c = only(result := verified(r.log, tmp_path))
     assert (c.verified, c.equal, result.result) == (14, 14, "incomplete")
-    assert list(c.unknown.items()) == [("OBSTACLES it had taken are not in the log", 3)]
+    assert list(c.unknown.items()) == [("OBSTACLES or HULL it had taken are not in the log", 3)]
     assert c.first_unknown == 5
 
 

@@ -73,7 +73,7 @@ static void count_state(void *user, enum lw_channel channel, const union lw_mess
 static void a_bus_counts_what_it_refuses(void **state)
 {
     (void)state;
-    static const unsigned char junk[3000] = {0};
+    static const unsigned char junk[LW_WIRE_MAX + 1000] = {0};
     struct random random = {2};
     struct lw_refusals refusals = {0};
     struct lw_error error = {""};
@@ -139,6 +139,54 @@ static void a_bus_hears_several_channels(void **state)
     assert_int_equal(heard[LW_CHANNEL_OBSTACLES], 1);
     assert_int_equal(lw_refusals_total(&refusals), 50);
     lcm_destroy(lcm);
+    lw_bus_close(bus);
+}
+
+// What is handed on, by channel and number.
+struct heard {
+    int count;
+    struct {
+        enum lw_channel channel;
+        int64_t seq;
+    } message[300];
+};
+
+static void note_order(void *user, enum lw_channel channel, const union lw_message *message)
+{
+    struct heard *heard = user;
+    heard->message[heard->count].channel = channel;
+    heard->message[heard->count++].seq = message->stamp.seq;
+}
+
+// A sender's hulls and obstacles are handed on in the order in which it sent them, however many wait.
+static void hulls_and_obstacles_keep_their_order(void **state)
+{
+    (void)state;
+    struct random random = {6};
+    struct lw_error error = {""};
+    struct lw_refusals refusals = {0};
+    struct lw_bus *bus = NULL, *sender = NULL;
+    struct heard sent = {0}, heard = {0};
+    const struct lw_bus_config listens = {.url = URL, .session = 5, .refusals = &refusals, .own_socket = true};
+    const struct lw_bus_config sends = {.url = URL, .session = 6};
+    assert_int_equal(lw_bus_open(&listens, &bus, &error), LW_OK);
+    assert_int_equal(lw_bus_open(&sends, &sender, &error), LW_OK);
+    assert_int_equal(lw_bus_subscribe(bus, LW_CHANNEL_OBSTACLES, note_order, &heard, &error), LW_OK);
+    assert_int_equal(lw_bus_subscribe(bus, LW_CHANNEL_HULL, note_order, &heard, &error), LW_OK);
+    while (sent.count < 300) {
+        const enum lw_channel channel = random_below(&random, 2) ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES;
+        for (int run = 1 + random_below(&random, 9); run > 0 && sent.count < 300; run--) {
+            union lw_message m = make(&random, channel);
+            assert_int_equal(lw_bus_publish(sender, channel, &m), LW_OK);
+            note_order(&sent, channel, &m);
+        }
+    }
+    for (int i = 0; i < 300 && heard.count < 300; i++)
+        assert_true(lw_bus_handle(bus, SOON));
+    assert_int_equal(heard.count, 300);
+    for (int i = 0; i < 300; i++)
+        assert_true(heard.message[i].channel == sent.message[i].channel && heard.message[i].seq == sent.message[i].seq);
+    lw_bus_close(sender);
     lw_bus_close(bus);
 }
 
@@ -254,6 +302,7 @@ int main(void)
         cmocka_unit_test(what_the_bus_publishes_arrives),
         cmocka_unit_test(a_bus_counts_what_it_refuses),
         cmocka_unit_test(a_bus_hears_several_channels),
+        cmocka_unit_test(hulls_and_obstacles_keep_their_order),
         cmocka_unit_test(a_flood_does_not_reach_a_small_buffer),
         cmocka_unit_test(a_flood_does_not_slip_in_while_opening),
         cmocka_unit_test(the_port_is_shared),

@@ -9,6 +9,7 @@
 #include "base/digest.h"
 #include "collision/world.h" // lw_world_apply
 #include "tick_rig.h"        // start
+#include "world_changes.h"   // ball, change, apply
 
 // All that a tick is given, in one piece, so that each of its bits can be changed.
 struct input {
@@ -44,12 +45,13 @@ static struct input *make_input(struct rig *rig)
     input.joint = rig->joint;
     input.warming_up = false;
     input.joint.qd[2] = 0.5;
-    const struct lw_obstacle_change change = {.stamp = {1, 2, 3, 4},
-                                              .count = 2,
-                                              .obstacle = {{.id = 33, .p = {-0.35, -0.5, 0.36}, .radius = 0.08},
-                                                           {.id = 34, .p = {0.5, 0.5, 0.5}, .radius = 0}}};
+    const struct lw_obstacle_change change = {
+        .stamp = {1, 2, 3, 4},
+        .count = 2,
+        .obstacle = {{.id = 33, .p = {-0.35, -0.5, 0.36}, .quat = {1}, .radius = 0.08},
+                     {.id = 34, .p = {0.5, 0.5, 0.5}, .quat = {1}, .radius = 0}}};
     assert_int_equal(lw_world_apply(&world, &change), LW_OK);
-    lw_world_build(&world, &input.world);
+    assert_int_equal(lw_world_build(&world, &input.world), LW_OK);
     input.request = (struct lw_request){.stamp = {11, 12, 5, 6}, .kind = LW_REQUEST_GOAL, .goal = {0.3, -0.5, 0.3}};
     return &input;
 }
@@ -170,94 +172,87 @@ static void a_changed_bit_is_never_lost(void **state)
 
 // --- the world ---
 
-enum { MINE = 7, YOURS = 8 };
-static const struct lw_obstacle none = {0};
-
-static struct lw_obstacle ball(int id, double x)
+static int64_t digest_of_change(const struct lw_obstacle_change *c)
 {
-    return (struct lw_obstacle){.id = id, .p = {x, 2 * x, 0.5}, .radius = 0.1};
+    struct lw_world *world = empty_world();
+    assert_int_equal(lw_world_apply(world, c), LW_OK);
+    return world->digest;
 }
 
-// A change of one or two obstacles; id 0 = none.
-static enum lw_status apply(struct lw_world *world, int64_t session, enum lw_change_op op, struct lw_obstacle a,
-                            struct lw_obstacle b)
-{
-    const struct lw_obstacle_change c = {.stamp = {.session = session, .seq = world->last.seq + 1},
-                                         .op = op,
-                                         .count = (a.id != 0) + (b.id != 0),
-                                         .obstacle = {a, b}};
-    return lw_world_apply(world, &c);
-}
-
-static int64_t digest_of_set(struct lw_obstacle a, struct lw_obstacle b)
-{
-    struct lw_world world = {0};
-    assert_int_equal(apply(&world, MINE, LW_UPSERT, a, b), LW_OK);
-    return world.digest;
-}
-
-// One bit of a centre, a radius or an id makes another digest.
+// One bit of any value of an obstacle, of its times or of a vertex makes another digest.
 static void every_bit_of_an_obstacle_counts(void **state)
 {
     (void)state;
-    struct lw_obstacle a = ball(1, 0.5), b = ball(2, -0.25);
-    const int64_t digest = digest_of_set(a, b);
-    struct {
+    struct lw_obstacle_change c = hull(MINE, 1, 5, 3);
+    struct lw_obstacle *o = &c.obstacle[0];
+    c.time_ns = INT64_C(123456789);
+    c.valid_for_ms = 5;
+    const struct {
         void *field;
         size_t size;
-    } fields[] = {{&a.id, sizeof a.id}, {a.p, sizeof a.p}, {&a.radius, sizeof a.radius},
-                  {&b.id, sizeof b.id}, {b.p, sizeof b.p}, {&b.radius, sizeof b.radius}};
+    } fields[] = {{&o->id, sizeof o->id},      {o->p, sizeof o->p},
+                  {o->quat, sizeof o->quat},   {&o->radius, sizeof o->radius},
+                  {o->size, sizeof o->size},   {o->v, sizeof o->v},
+                  {o->omega, sizeof o->omega}, {&c.time_ns, sizeof c.time_ns},
+                  {&c.valid_for_ms, 2},        {c.vertex, 9 * sizeof c.vertex[0]}};
+    const int64_t digest = digest_of_change(&c);
     for (size_t f = 0; f < sizeof fields / sizeof fields[0]; f++)
         for (size_t bit = 0; bit < 8 * fields[f].size; bit++) {
             unsigned char *byte = (unsigned char *)fields[f].field + bit / 8;
             *byte = (unsigned char)(*byte ^ (1u << (bit % 8)));
-            if (a.id != 0 && b.id != 0 && a.id != b.id)
-                assert_int_not_equal(digest_of_set(a, b), digest);
+            assert_int_not_equal(digest_of_change(&c), digest);
             *byte = (unsigned char)(*byte ^ (1u << (bit % 8)));
         }
-    assert_int_equal(digest_of_set(a, b), digest);
-    assert_int_not_equal(digest_of_set(b, a), digest); // the law meets them in their order
+    assert_int_equal(digest_of_change(&c), digest);
+    c.vertex_count = 4; // one more at the origin
+    assert_int_not_equal(digest_of_change(&c), digest);
+    const struct lw_obstacle_change solid = change(MINE, 1, LW_UPSERT, ball(5, 1), none);
+    struct lw_obstacle_change other = solid;
+    other.obstacle[0].shape = LW_CAPSULE;
+    assert_int_not_equal(digest_of_change(&solid), digest_of_change(&other));
 }
 
 // The digest is that of the set, however the world came to it and whoever sent it; what changes nothing keeps it.
 static void the_digest_is_that_of_the_set(void **state)
 {
     (void)state;
-    static struct lw_world world, empty;
-    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(1, 0.1), ball(2, 0.2)), LW_OK);
-    const int64_t digest = world.digest;
-    assert_int_equal(apply(&world, YOURS, LW_UPSERT, ball(3, 0.3), none), LW_OK);
-    assert_int_not_equal(world.digest, digest);
-    assert_int_equal(apply(&world, YOURS, LW_REMOVE, ball(3, 0), none), LW_OK);
-    assert_int_equal(world.digest, digest);
-    assert_int_equal(apply(&world, YOURS, LW_REPLACE, ball(1, 0.1), none), LW_OK);
-    assert_int_equal(world.digest, digest);
-    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(2, 0.7), none), LW_OK);
-    assert_int_not_equal(world.digest, digest);
-    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(2, 0.2), none), LW_OK);
-    assert_int_equal(world.digest, digest);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(1, 0.1), ball(2, 0.2));
+    const int64_t digest = world->digest;
+    apply(world, YOURS, LW_UPSERT, ball(3, 0.3), none);
+    assert_int_not_equal(world->digest, digest);
+    apply(world, YOURS, LW_REMOVE, ball(3, 0), none);
+    assert_int_equal(world->digest, digest);
+    apply(world, YOURS, LW_REPLACE, ball(1, 0.1), none);
+    assert_int_equal(world->digest, digest);
+    apply(world, MINE, LW_UPSERT, ball(2, 0.7), none);
+    assert_int_not_equal(world->digest, digest);
+    apply(world, MINE, LW_UPSERT, ball(2, 0.2), none);
+    assert_int_equal(world->digest, digest);
     // No obstacle, one that was heard of and one at the origin are three different things.
-    assert_int_equal(apply(&world, MINE, LW_CLEAR, none, none), LW_OK);
-    assert_int_equal(apply(&empty, MINE, LW_UPSERT, none, none), LW_OK);
-    assert_int_equal(world.digest, empty.digest);
-    assert_int_equal(empty.digest, (int64_t)lw_digest_int(LW_DIGEST_START, 0)); // the count stands first
-    assert_int_equal(apply(&empty, MINE, LW_UPSERT, (struct lw_obstacle){.id = 1}, none), LW_OK);
-    assert_int_not_equal(world.digest, empty.digest);
+    apply(world, MINE, LW_CLEAR, none, none);
+    assert_int_equal(world->digest, 0);
+    apply(world, MINE, LW_UPSERT, (struct lw_obstacle){.id = 1}, none);
+    assert_int_not_equal(world->digest, 0);
+    // The order in which they came is no part of it.
+    apply(world, MINE, LW_REPLACE, ball(2, 0.2), none);
+    apply(world, MINE, LW_UPSERT, ball(1, 0.1), none);
+    assert_int_equal(world->digest, digest);
 }
 
 // A change that is refused leaves the digest too, and so does one that comes again.
 static void a_refused_change_keeps_the_digest(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(1, 0.1), none), LW_OK);
-    assert_int_equal(apply(&world, MINE, LW_UPSERT, ball(1, 0.2), none), LW_OK);
-    const int64_t digest = world.digest;
-    world.last.seq = 0;
-    assert_int_equal(apply(&world, MINE, LW_CLEAR, none, none), LW_E_OLD);
-    world.last.seq = 1;
-    assert_int_equal(apply(&world, MINE, LW_CLEAR, none, none), LW_OK);
-    assert_int_equal(world.digest, digest);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(1, 0.1), none);
+    apply(world, MINE, LW_UPSERT, ball(1, 0.2), none);
+    const int64_t digest = world->digest;
+    struct lw_obstacle_change c = change(MINE, 1, LW_CLEAR, none, none);
+    assert_int_equal(lw_world_apply(world, &c), LW_E_OLD);
+    c.stamp.seq = 2;
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    assert_int_equal(world->digest, digest);
 }
 
 // --- a step ---

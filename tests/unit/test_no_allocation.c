@@ -109,7 +109,7 @@ static void every_channel_allocates_nothing(void **state)
         if (n % 3 == 0)
             data[random_below(&random, (int)size)] ^= 0x55;
         const bool ok = lw_wire_decode(channel, data, size, &out) == LW_OK;
-        if (ok && channel == LW_CHANNEL_OBSTACLES)
+        if (ok && (channel == LW_CHANNEL_OBSTACLES || channel == LW_CHANNEL_HULL))
             (void)(lw_world_apply(&world, &out.obstacles) == LW_OK);
         *(ok ? &taken : &refused) += 1;
     }

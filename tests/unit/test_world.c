@@ -1,136 +1,88 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Tests of the world: every operation against what a plain list would hold, ownership, versions, and the full world.
+// Tests of the world: what each operation of each source does to the set of obstacles, and that refused changes and
+// changes that change nothing leave it as it was. test_world_full.c has its limits, test_world_random.c any sequence.
 //
 // Units    metres.
 // Frames   base frame.
 // Arrays   none.
 // Memory   static where worlds are large.
 // Errors   cmocka's.
-#include "base/vec.h" // lw_vec_*
 #include "collision/world.h"
 #include "helpers.h"
-
-enum { MINE = 7, YOURS = 8 };
-
-static struct lw_obstacle ball(int id, double x)
-{
-    return (struct lw_obstacle){.id = id, .p = {x, 2 * x, 0.5}, .quat = {1}, .radius = 0.1};
-}
-
-// A change of one or two obstacles; id 0 = none.
-static struct lw_obstacle_change change(int64_t session, int64_t seq, enum lw_change_op op, struct lw_obstacle a,
-                                        struct lw_obstacle b)
-{
-    return (struct lw_obstacle_change){
-        .stamp = {.session = session, .seq = seq}, .op = op, .count = (a.id != 0) + (b.id != 0), .obstacle = {a, b}};
-}
-
-static void apply(struct lw_world *world, int64_t session, enum lw_change_op op, struct lw_obstacle a,
-                  struct lw_obstacle b)
-{
-    const struct lw_obstacle_change c = change(session, world->last.seq + 1, op, a, b);
-    assert_int_equal(lw_world_apply(world, &c), LW_OK);
-    assert_true(world->last.session == session && world->last.seq == c.stamp.seq);
-}
-
-static const struct lw_obstacle none = {0};
-
-// The obstacle of an id; id 0 = the world has none.
-static struct lw_obstacle get(const struct lw_world *world, int id)
-{
-    struct lw_obstacle found = none;
-    for (int i = 0; i < world->count; i++)
-        if (world->obstacle[i].id == id) {
-            assert_int_equal(found.id, 0); // ids are unique
-            found = world->obstacle[i];
-        }
-    return found;
-}
-
-static int64_t owner_of(const struct lw_world *world, int id)
-{
-    for (int i = 0; i < world->count; i++)
-        if (world->obstacle[i].id == id)
-            return world->owner[i];
-    return 0;
-}
+#include "world_changes.h" // ball, change, apply
 
 // --- operations ---
 
 static void upsert_adds_and_overwrites_by_id(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    apply(&world, MINE, LW_UPSERT, ball(3, 1), ball(5, 2));
-    assert_int_equal(world.count, 2);
-    apply(&world, MINE, LW_UPSERT, ball(5, 9), none);
-    assert_int_equal(world.count, 2);
-    assert_near(get(&world, 5).p[1], 18, 0);
-    assert_near(get(&world, 5).radius, 0.1, 0);
-    assert_near(get(&world, 3).p[0], 1, 0);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(3, 1), ball(5, 2));
+    assert_int_equal(world->count, 2);
+    apply(world, MINE, LW_UPSERT, ball(5, 9), none);
+    assert_int_equal(world->count, 2);
+    assert_near(get(world, 5).p[1], 18, 0);
+    assert_near(get(world, 5).radius, 0.1, 0);
+    assert_near(get(world, 3).p[0], 1, 0);
 }
 
 // Anyone may remove anything; what is not there cannot be removed.
 static void remove_reaches_every_source(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    apply(&world, MINE, LW_UPSERT, ball(3, 1), ball(5, 2));
-    apply(&world, YOURS, LW_REMOVE, ball(3, 0), ball(99, 0));
-    assert_int_equal(world.count, 1);
-    assert_int_equal(get(&world, 3).id, 0);
-    assert_int_not_equal(get(&world, 5).id, 0);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(3, 1), ball(5, 2));
+    apply(world, YOURS, LW_REMOVE, ball(3, 0), ball(99, 0));
+    assert_int_equal(world->count, 1);
+    assert_int_equal(get(world, 3).id, 0);
+    assert_int_not_equal(get(world, 5).id, 0);
 }
 
 // Replace drops what its own sender sent before and leaves other sources alone.
 static void replace_is_the_whole_set_of_one_source(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    apply(&world, MINE, LW_UPSERT, ball(1, 1), ball(2, 2));
-    apply(&world, YOURS, LW_UPSERT, ball(3, 3), none);
-    apply(&world, MINE, LW_REPLACE, ball(2, 7), ball(4, 4));
-    assert_int_equal(world.count, 3);
-    assert_int_equal(get(&world, 1).id, 0);
-    assert_near(get(&world, 2).p[0], 7, 0);
-    assert_near(get(&world, 3).p[0], 3, 0);
-    assert_int_not_equal(get(&world, 4).id, 0);
-    apply(&world, MINE, LW_REPLACE, none, none);
-    assert_int_equal(world.count, 1);
-    assert_int_not_equal(get(&world, 3).id, 0);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(1, 1), ball(2, 2));
+    apply(world, YOURS, LW_UPSERT, ball(3, 3), none);
+    apply(world, MINE, LW_REPLACE, ball(2, 7), ball(4, 4));
+    assert_int_equal(world->count, 3);
+    assert_int_equal(get(world, 1).id, 0);
+    assert_near(get(world, 2).p[0], 7, 0);
+    assert_near(get(world, 3).p[0], 3, 0);
+    assert_int_not_equal(get(world, 4).id, 0);
+    apply(world, MINE, LW_REPLACE, none, none);
+    assert_int_equal(world->count, 1);
+    assert_int_not_equal(get(world, 3).id, 0);
 }
 
 // Whoever sends an id last owns it: the old owner's replace no longer drops it, the new owner's does.
 static void the_last_sender_owns_an_id(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    apply(&world, MINE, LW_UPSERT, ball(1, 1), none);
-    apply(&world, YOURS, LW_UPSERT, ball(1, 1), none); // same place, new owner
-    assert_int_equal(owner_of(&world, 1), YOURS);
-    assert_int_equal(world.version, 2);
-    apply(&world, MINE, LW_REPLACE, ball(2, 2), none);
-    assert_int_not_equal(get(&world, 1).id, 0);
-    apply(&world, YOURS, LW_REPLACE, none, none);
-    assert_int_equal(get(&world, 1).id, 0);
-    apply(&world, YOURS, LW_REPLACE, ball(2, 2), none); // takes 2 over
-    assert_int_equal(owner_of(&world, 2), YOURS);
-    assert_int_equal(world.count, 1);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(1, 1), none);
+    apply(world, YOURS, LW_UPSERT, ball(1, 1), none); // same place, new owner
+    assert_int_equal(owner_of(world, 1), YOURS);
+    assert_int_equal(world->version, 2);
+    apply(world, MINE, LW_REPLACE, ball(2, 2), none);
+    assert_int_not_equal(get(world, 1).id, 0);
+    apply(world, YOURS, LW_REPLACE, none, none);
+    assert_int_equal(get(world, 1).id, 0);
+    apply(world, YOURS, LW_REPLACE, ball(2, 2), none); // takes 2 over
+    assert_int_equal(owner_of(world, 2), YOURS);
+    assert_int_equal(world->count, 1);
 }
 
 static void clear_drops_everything_of_everyone(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    apply(&world, MINE, LW_UPSERT, ball(1, 1), none);
-    apply(&world, YOURS, LW_UPSERT, ball(2, 2), none);
-    apply(&world, 9, LW_CLEAR, ball(5, 5), none); // what it lists is ignored
-    assert_int_equal(world.count, 0);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(1, 1), none);
+    apply(world, YOURS, LW_UPSERT, ball(2, 2), none);
+    apply(world, 9, LW_CLEAR, ball(5, 5), none); // what it lists is ignored
+    assert_int_equal(world->count, 0);
+    assert_int_equal(lw_world_find(world, 1), -1);
 }
 
 // --- versions ---
@@ -139,8 +91,7 @@ static void clear_drops_everything_of_everyone(void **state)
 static void the_version_counts_real_changes(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
+    struct lw_world *world = empty_world();
     const struct {
         enum lw_change_op op;
         struct lw_obstacle a;
@@ -151,8 +102,8 @@ static void the_version_counts_real_changes(void **state)
                  {LW_CLEAR, none, 4},          {LW_REPLACE, ball(4, 1), 5}, {LW_REPLACE, ball(5, 1), 6},
                  {LW_CLEAR, none, 7},          {LW_UPSERT, ball(1, 1), 8}};
     for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
-        apply(&world, MINE, steps[i].op, steps[i].a, none);
-        assert_int_equal(world.version, steps[i].version);
+        apply(world, MINE, steps[i].op, steps[i].a, none);
+        assert_int_equal(world->version, steps[i].version);
     }
 }
 
@@ -160,32 +111,46 @@ static void the_version_counts_real_changes(void **state)
 static void one_difference_makes_one_version(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    apply(&world, MINE, LW_UPSERT, ball(1, 1), ball(2, 2));
-    assert_int_equal(world.version, 1);
-    apply(&world, MINE, LW_UPSERT, ball(1, 9), ball(2, 2)); // the first alone
-    assert_int_equal(world.version, 2);
-    apply(&world, MINE, LW_UPSERT, ball(1, 9), ball(2, 9)); // the second alone
-    assert_int_equal(world.version, 3);
-    apply(&world, MINE, LW_REPLACE, ball(2, 9), none); // only drops
-    assert_int_equal(world.version, 4);
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, ball(1, 1), ball(2, 2));
+    assert_int_equal(world->version, 1);
+    apply(world, MINE, LW_UPSERT, ball(1, 9), ball(2, 2)); // the first alone
+    assert_int_equal(world->version, 2);
+    apply(world, MINE, LW_UPSERT, ball(1, 9), ball(2, 9)); // the second alone
+    assert_int_equal(world->version, 3);
+    apply(world, MINE, LW_REPLACE, ball(2, 9), none); // only drops
+    assert_int_equal(world->version, 4);
 }
 
-// Each number of an obstacle makes a difference.
+// Every number of an obstacle makes a difference, and so do the times of its message.
 static void every_number_is_compared(void **state)
 {
     (void)state;
-    for (int field = 0; field < 4; field++) {
-        static struct lw_world world;
-        memset(&world, 0, sizeof world);
-        struct lw_obstacle o = ball(1, 1);
-        apply(&world, MINE, LW_UPSERT, o, none);
-        *(field < 3 ? &o.p[field] : &o.radius) += 1e-9;
-        apply(&world, MINE, LW_UPSERT, o, none);
-        assert_int_equal(world.version, 2);
-        assert_near(field < 3 ? get(&world, 1).p[field] : get(&world, 1).radius, field < 3 ? o.p[field] : o.radius, 0);
+    struct random random = {44};
+    struct lw_obstacle o = ball(1, 1);
+    double *const fields[] = {&o.p[0],    &o.p[1],   &o.p[2],     &o.quat[0],  &o.quat[1], &o.quat[2],
+                              &o.quat[3], &o.radius, &o.size[0],  &o.size[1],  &o.size[2], &o.v[0],
+                              &o.v[1],    &o.v[2],   &o.omega[0], &o.omega[1], &o.omega[2]};
+    struct lw_world *world = empty_world();
+    apply(world, MINE, LW_UPSERT, o, none);
+    for (size_t f = 0; f < sizeof fields / sizeof fields[0]; f++) {
+        *fields[f] += 1e-9 * (1 + random_in(&random, 0, 1));
+        apply(world, MINE, LW_UPSERT, o, none);
+        assert_int_equal(world->version, 2 + (int)f);
+        const struct lw_obstacle found = get(world, 1);
+        assert_same_bits(&found, &o, sizeof o);
     }
+    const int64_t version = world->version;
+    struct lw_obstacle_change c = change(MINE, world->last.seq + 1, LW_UPSERT, o, none);
+    c.time_ns = 5;
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    c.stamp.seq++;
+    c.valid_for_ms = 1;
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    c.stamp.seq++;
+    assert_int_equal(lw_world_apply(world, &c), LW_OK); // nothing new
+    assert_int_equal(world->version, version + 2);
+    assert_int_equal(world->expires_ns[lw_world_find(world, 1)], 1000005);
 }
 
 // --- order ---
@@ -195,110 +160,234 @@ static void every_number_is_compared(void **state)
 static void messages_of_a_sender_count_once_and_in_order(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
+    struct lw_world *world = empty_world();
     const struct lw_obstacle_change first = change(MINE, 4, LW_UPSERT, ball(1, 1), none);
     const struct lw_obstacle_change second = change(MINE, 5, LW_UPSERT, ball(1, 2), none);
     const struct lw_obstacle_change other = change(YOURS, 1, LW_UPSERT, ball(2, 7), none);
-    assert_int_equal(lw_world_apply(&world, &second), LW_OK);
-    assert_int_equal(lw_world_apply(&world, &first), LW_E_OLD);
-    assert_int_equal(lw_world_apply(&world, &other), LW_OK);
-    const int64_t version = world.version;
-    assert_int_equal(lw_world_apply(&world, &second), LW_OK);
-    assert_true(world.last.session == MINE && world.last.seq == 5 && world.version == version);
-    assert_near(get(&world, 1).p[0], 2, 0);
-    assert_int_equal(world.count, 2);
+    assert_int_equal(lw_world_apply(world, &second), LW_OK);
+    assert_int_equal(lw_world_apply(world, &first), LW_E_OLD);
+    assert_int_equal(lw_world_apply(world, &other), LW_OK);
+    const int64_t version = world->version;
+    assert_int_equal(lw_world_apply(world, &second), LW_OK);
+    assert_true(world->last.session == MINE && world->last.seq == 5 && world->version == version);
+    assert_near(get(world, 1).p[0], 2, 0);
+    assert_int_equal(world->count, 2);
+}
+
+// Numbers count by channel: a sender's first hull comes after its hundredth message on OBSTACLES.
+static void each_channel_has_its_own_order(void **state)
+{
+    (void)state;
+    struct lw_world *world = empty_world();
+    const struct lw_obstacle_change solid = change(MINE, 100, LW_UPSERT, ball(1, 1), none);
+    const struct lw_obstacle_change first = hull(MINE, 1, 2, 8), second = hull(MINE, 2, 2, 9);
+    assert_int_equal(lw_world_apply(world, &solid), LW_OK);
+    assert_int_equal(world->last_channel, LW_WORLD_OBSTACLES);
+    assert_int_equal(lw_world_apply(world, &second), LW_OK);
+    assert_int_equal(world->last_channel, LW_WORLD_HULL);
+    assert_int_equal(lw_world_apply(world, &first), LW_E_OLD);
+    const struct lw_obstacle_change late = change(MINE, 99, LW_UPSERT, ball(1, 2), none);
+    assert_int_equal(lw_world_apply(world, &late), LW_E_OLD);
+    assert_int_equal(world->count, 2);
 }
 
 // More senders than are remembered: the one heard first is forgotten, nothing else is lost.
 static void old_senders_make_room_for_new_ones(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
+    struct lw_world *world = empty_world();
     for (int k = 1; k <= LW_SENDERS_MAX + 1; k++) {
         const struct lw_obstacle_change c = change(1000 + k, 9, LW_UPSERT, ball(k, k), none);
-        assert_int_equal(lw_world_apply(&world, &c), LW_OK);
+        assert_int_equal(lw_world_apply(world, &c), LW_OK);
     }
     const struct lw_obstacle_change forgotten = change(1001, 8, LW_UPSERT, ball(1, 50), none);
     const struct lw_obstacle_change known = change(1003, 8, LW_UPSERT, ball(3, 50), none);
-    assert_int_equal(lw_world_apply(&world, &known), LW_E_OLD);
-    assert_int_equal(lw_world_apply(&world, &forgotten), LW_OK);
-    assert_int_equal(world.count, LW_SENDERS_MAX + 1);
+    assert_int_equal(lw_world_apply(world, &known), LW_E_OLD);
+    assert_int_equal(lw_world_apply(world, &forgotten), LW_OK);
+    assert_int_equal(world->count, LW_SENDERS_MAX + 1);
 }
 
-// --- full ---
+// --- expiry ---
 
-static void fill(struct lw_world *world, int count)
+static struct lw_obstacle_change timed(int64_t session, int64_t seq, int64_t time_ns, int valid_for_ms,
+                                       struct lw_obstacle a)
 {
-    for (int id = 1; id <= count; id += 2)
-        apply(world, MINE, LW_UPSERT, ball(id, id), id + 1 <= count ? ball(id + 1, 1) : none);
+    struct lw_obstacle_change c = change(session, seq, LW_UPSERT, a, none);
+    c.time_ns = time_ns;
+    c.valid_for_ms = valid_for_ms;
+    return c;
 }
 
-// The last place can be used; a change that needs one more is refused whole, the world stays byte for byte.
-static void a_full_world_refuses_whole_changes(void **state)
-{
-    (void)state;
-    static struct lw_world world, before;
-    memset(&world, 0, sizeof world);
-    fill(&world, LW_REGISTRY_MAX - 1);
-    struct lw_obstacle_change c = change(YOURS, 1, LW_UPSERT, ball(901, 1), ball(902, 2));
-    memcpy(&before, &world, sizeof world); // padding too
-    assert_int_equal(lw_world_apply(&world, &c), LW_E_FULL);
-    assert_same_bits(&world, &before, sizeof world);
-
-    apply(&world, YOURS, LW_UPSERT, ball(901, 1), none);
-    assert_int_equal(world.count, LW_REGISTRY_MAX);
-    apply(&world, YOURS, LW_UPSERT, ball(901, 5), ball(1, 5)); // overwriting needs no room
-    assert_near(get(&world, 1).p[0], 5, 0);
-    memcpy(&before, &world, sizeof world); // padding too
-    c = change(MINE, INT64_MAX, LW_UPSERT, ball(2, 8), ball(903, 2));
-    assert_int_equal(lw_world_apply(&world, &c), LW_E_FULL);
-    assert_same_bits(&world, &before, sizeof world);
-}
-
-// A replacement frees its sender's places before it takes new ones.
-static void replace_makes_room_first(void **state)
+// A source's own clock ends what it sent; the clocks of others, and messages without a time, do not.
+static void a_clock_judges_its_own_obstacles(void **state)
 {
     (void)state;
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    fill(&world, LW_REGISTRY_MAX);
-    apply(&world, MINE, LW_REPLACE, ball(901, 1), ball(902, 1));
-    assert_int_equal(world.count, 2);
+    struct lw_world *world = empty_world();
+    const struct lw_obstacle_change changes[] = {
+        timed(MINE, 1, 1000, 1, ball(1, 1)),        // until 1 001 000
+        timed(YOURS, 1, 2000, 1, ball(2, 1)),       // until 1 002 000
+        timed(MINE, 2, 1001000 - 1, 0, ball(3, 1)), // a moment too early for 1
+        timed(YOURS, 2, 1001999, 0, ball(4, 1)),    // not mine to judge
+        timed(MINE, 3, 0, 0, ball(5, 1)),           // tells no time
+    };
+    for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++)
+        assert_int_equal(lw_world_apply(world, &changes[i]), LW_OK);
+    assert_int_equal(world->count, 5);
+    const int64_t version = world->version;
+    const struct lw_obstacle_change mine = timed(MINE, 4, 1001000, 0, ball(3, 1));
+    assert_int_equal(lw_world_apply(world, &mine), LW_OK);
+    assert_int_equal(get(world, 1).id, 0);
+    assert_int_equal(world->count, 4);
+    assert_int_equal(world->version, version + 1);
+    const struct lw_obstacle_change yours = timed(YOURS, 3, 1002000, 0, none);
+    assert_int_equal(lw_world_apply(world, &yours), LW_OK); // names nothing, and still tells the time
+    assert_int_equal(get(world, 2).id, 0);
 }
 
-// --- any sequence ---
-
-// Random changes of three sources against the plainest model: one owner and one place for each of 12 ids.
-static void random_changes_match_a_plain_model(void **state)
+// What is named again lives on, also when its time was over: a hull keeps its vertices.
+static void what_is_named_again_lives_on(void **state)
 {
     (void)state;
-    enum { IDS = 12 };
-    struct random random = {42};
-    int64_t owner[IDS + 1] = {0};
-    double place[IDS + 1] = {0};
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
-    for (int n = 0; n < 5000; n++) {
-        const int64_t session = 1 + random_below(&random, 3);
-        const int op = random_below(&random, 30) ? random_below(&random, 3) : LW_CLEAR;
-        const int a = 1 + random_below(&random, IDS), b = 1 + (a + random_below(&random, IDS - 1)) % IDS;
-        const double x = random_below(&random, 3);
-        apply(&world, session, (enum lw_change_op)op, ball(a, x), ball(b, x));
-        for (int id = 1; id <= IDS; id++) {
-            const bool listed = id == a || id == b;
-            if (op == LW_CLEAR || (op == LW_REMOVE && listed) || (op == LW_REPLACE && owner[id] == session))
-                owner[id] = 0;
-            if (listed && (op == LW_UPSERT || op == LW_REPLACE)) {
-                owner[id] = session;
-                place[id] = x;
-            }
-            const struct lw_obstacle o = get(&world, id);
-            assert_int_equal(owner_of(&world, id), owner[id]);
-            assert_true(o.id == 0 || o.p[0] == place[id]);
-        }
+    struct lw_world *world = empty_world();
+    struct lw_obstacle_change first = hull(MINE, 1, 7, 8);
+    first.time_ns = 1000;
+    first.valid_for_ms = 1;
+    assert_int_equal(lw_world_apply(world, &first), LW_OK);
+    const struct lw_obstacle_change later = timed(MINE, 1, INT64_C(5000000000), 1, first.obstacle[0]);
+    assert_int_equal(lw_world_apply(world, &later), LW_OK);
+    double vertex[3 * LW_HULL_MAX];
+    assert_int_equal(vertices_of(world, 7, vertex), 8);
+    assert_same_bits(vertex, first.vertex, 24 * sizeof vertex[0]);
+    // An expiry that was put off counts as the new one.
+    const struct lw_obstacle_change end = timed(MINE, 2, INT64_C(5001000000), 0, none);
+    assert_int_equal(lw_world_apply(world, &end), LW_OK);
+    assert_int_equal(world->count, 0);
+}
+
+// --- hulls ---
+
+// A hull may be moved, kept and taken over by its id; without vertices it is refused whole.
+static void hulls_are_named_by_their_ids(void **state)
+{
+    (void)state;
+    struct lw_world *world = empty_world();
+    const struct lw_obstacle_change told = hull(MINE, 1, 7, 8);
+    struct lw_obstacle moved = told.obstacle[0], unknown = told.obstacle[0];
+    double vertex[3 * LW_HULL_MAX];
+    unknown.id = 8;
+    moved.p[0] += 1;
+    const struct lw_obstacle_change bad = change(MINE, 1, LW_UPSERT, ball(1, 1), unknown);
+    assert_int_equal(lw_world_apply(world, &bad), LW_E_UNKNOWN);
+    assert_true(world->version == 0 && world->count == 0); // the ball neither
+    assert_int_equal(lw_world_apply(world, &told), LW_OK);
+    const uint32_t generation = world->entry[lw_world_find(world, 7)].generation;
+
+    apply(world, YOURS, LW_UPSERT, moved, none);
+    assert_near(get(world, 7).p[0], moved.p[0], 0);
+    assert_int_equal(owner_of(world, 7), YOURS);
+    assert_int_equal(vertices_of(world, 7, vertex), 8);
+    assert_same_bits(vertex, told.vertex, 24 * sizeof vertex[0]);
+    assert_int_equal(world->entry[lw_world_find(world, 7)].generation, generation);
+    apply(world, YOURS, LW_REPLACE, moved, none); // kept
+    assert_int_equal(vertices_of(world, 7, vertex), 8);
+
+    // Another shape under the same id has no vertices, and they do not come back.
+    apply(world, MINE, LW_UPSERT, ball(7, 1), none);
+    assert_int_equal(vertices_of(world, 7, vertex), 0);
+    assert_int_equal(world->chunks_used, 0);
+    const struct lw_obstacle_change gone = change(MINE, world->last.seq + 1, LW_UPSERT, moved, none);
+    assert_int_equal(lw_world_apply(world, &gone), LW_E_UNKNOWN);
+}
+
+// Other vertices are another generation, the same ones told again are not; a new hull under an old id is another too.
+static void the_generation_tells_vertices_apart(void **state)
+{
+    (void)state;
+    struct lw_world *world = empty_world();
+    struct lw_obstacle_change c = hull(MINE, 1, 7, 9);
+    uint32_t seen = 0;
+    for (int step = 0; step < 6; step++) {
+        const bool same = step == 1 || step == 3;
+        c.stamp.seq++;
+        c.obstacle[0].p[1] += 0.1; // it moves all the time
+        if (step == 2)
+            c.vertex[26] += 1e-9; // the last number
+        if (step == 4)
+            c.vertex_count = 8; // one less
+        if (step == 5)
+            apply(world, YOURS, LW_REMOVE, ball(7, 0), none);
+        assert_int_equal(lw_world_apply(world, &c), LW_OK);
+        const uint32_t generation = world->entry[lw_world_find(world, 7)].generation;
+        assert_true(same ? generation == seen : generation > seen);
+        seen = generation;
     }
+}
+
+// --- snapshot ---
+
+// Everything is handed on, with its motion and the vertices in their places, and the echo of the world.
+static void the_snapshot_holds_everything(void **state)
+{
+    (void)state;
+    static struct lw_snapshot snapshot;
+    struct random random = {45};
+    struct lw_world *world = empty_world();
+    for (int id = 1; id <= 40; id++) {
+        struct lw_obstacle_change c = hull(MINE, id, id, 1 + id);
+        if (id % 2)
+            c = change(YOURS, id, LW_UPSERT, any_solid(&random, id), none);
+        c.time_ns = 1000 + id;
+        c.valid_for_ms = id % 3;
+        assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    }
+    assert_int_equal(lw_world_build(world, &snapshot), LW_OK);
+    assert_int_equal(snapshot.count, 40);
+    assert_true(snapshot.version == world->version && snapshot.digest == world->digest);
+    assert_true(snapshot.last.session == MINE && snapshot.last.seq == 40 && snapshot.last_channel == LW_WORLD_HULL);
+    for (int i = 0; i < snapshot.count; i++) {
+        const struct lw_shape shape = lw_snapshot_shape(&snapshot, i);
+        const int at = lw_world_find(world, (int)shape.id);
+        const struct lw_world_entry *entry = &world->entry[at];
+        const struct lw_motion *motion = &snapshot.item[i].motion;
+        double vertex[3 * LW_HULL_MAX], room[LW_HULL_ROOM];
+        const struct lw_solid solid =
+            lw_obstacle_solid(&entry->obstacle, vertex, lw_world_vertices(world, entry, vertex));
+        struct lw_pose pose;
+        struct lw_shape expected;
+        assert_int_equal(lw_pose_make(entry->obstacle.p, entry->obstacle.quat, &pose), LW_OK);
+        assert_int_equal(lw_shape_make(&solid, &pose, room, &expected, NULL), LW_OK);
+        assert_true(shape.kind == expected.kind && shape.generation == entry->generation);
+        assert_true(shape.bound == expected.bound && motion->time_ns == entry->time_ns);
+        assert_int_equal(motion->expires_ns, world->expires_ns[at]);
+        assert_same_bits(motion->v, entry->obstacle.v, sizeof motion->v);
+        assert_same_bits(motion->omega, entry->obstacle.omega, sizeof motion->omega);
+        if (shape.kind == LW_HULL)
+            assert_same_bits(shape.hull.vertex, room, 3 * (size_t)expected.hull.padded * sizeof room[0]);
+    }
+}
+
+// A copy goes on as the original would.
+static void a_copy_is_a_world_of_its_own(void **state)
+{
+    (void)state;
+    static struct lw_world copy;
+    struct lw_world *world = empty_world();
+    struct lw_obstacle_change c = hull(MINE, 1, 7, 64);
+    apply(&copy, MINE, LW_UPSERT, ball(98, 1), ball(99, 2)); // what was there before is gone
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    apply(world, MINE, LW_UPSERT, ball(1, 1), ball(2, 2));
+    lw_world_copy(world, &copy);
+    apply(world, MINE, LW_CLEAR, none, none);
+    double vertex[3 * LW_HULL_MAX];
+    assert_int_equal(vertices_of(&copy, 7, vertex), 64);
+    assert_same_bits(vertex, c.vertex, sizeof c.vertex);
+    assert_true(get(&copy, 98).id == 0 && get(&copy, 99).id == 0);
+    apply(&copy, YOURS, LW_UPSERT, ball(3, 3), none);
+    assert_true(copy.count == 4 && get(&copy, 2).p[0] == 2 && world->count == 0);
+    c.stamp.seq = 1;
+    assert_int_equal(lw_world_apply(&copy, &c), LW_OK);
+    c.stamp.seq = 0;
+    assert_int_equal(lw_world_apply(&copy, &c), LW_E_OLD);
 }
 
 int main(void)
@@ -313,10 +402,14 @@ int main(void)
         cmocka_unit_test(one_difference_makes_one_version),
         cmocka_unit_test(every_number_is_compared),
         cmocka_unit_test(messages_of_a_sender_count_once_and_in_order),
+        cmocka_unit_test(each_channel_has_its_own_order),
         cmocka_unit_test(old_senders_make_room_for_new_ones),
-        cmocka_unit_test(a_full_world_refuses_whole_changes),
-        cmocka_unit_test(replace_makes_room_first),
-        cmocka_unit_test(random_changes_match_a_plain_model),
+        cmocka_unit_test(a_clock_judges_its_own_obstacles),
+        cmocka_unit_test(what_is_named_again_lives_on),
+        cmocka_unit_test(hulls_are_named_by_their_ids),
+        cmocka_unit_test(the_generation_tells_vertices_apart),
+        cmocka_unit_test(the_snapshot_holds_everything),
+        cmocka_unit_test(a_copy_is_a_world_of_its_own),
     };
     return cmocka_run_group_tests_name("world", tests, NULL, NULL);
 }

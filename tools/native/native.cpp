@@ -10,6 +10,7 @@
 #include "collision.hpp" // bind_collision, bind_clearance
 #include "replay.hpp"    // bind_replay
 #include "scene.hpp"     // Scene
+#include "world.hpp"     // bind_world
 
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -169,5 +170,6 @@ NB_MODULE(_native, m)
     bind_collision(m);
     bind_clearance(m);
     m.def("simulate", &simulate, nb::arg("scene"), "Runs a scene in process; arrays by name.");
+    bind_world(m);
     bind_replay(m);
 }

@@ -9,6 +9,7 @@
 #include "replay.hpp"
 
 #include "scene.hpp" // Scene
+#include "world.hpp" // World, decode
 
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
@@ -17,9 +18,6 @@
 #include <algorithm> // copy
 #include <array>
 #include <cstdint>   // int64_t
-#include <cstdlib>   // calloc
-#include <memory>    // shared_ptr
-#include <new>       // bad_alloc
 #include <optional>  // optional
 #include <stdexcept> // invalid_argument
 #include <string>    // string
@@ -34,12 +32,6 @@ namespace nb = nanobind;
 
 namespace
 {
-
-// A message of a log as the programs take it: decoded and validated by the same code.
-bool decode(lw_channel channel, const nb::bytes &data, lw_message &message)
-{
-    return lw_wire_decode(channel, data.data(), static_cast<uint32_t>(data.size()), &message) == LW_OK;
-}
 
 // For each of the messages of a channel, one behind the other: 1 = a program would take it, 0 = refuse it.
 nb::bytes acceptable(const std::string &channel, const nb::bytes &messages)
@@ -59,55 +51,6 @@ nb::bytes acceptable(const std::string &channel, const nb::bytes &messages)
     }
     return nb::bytes(verdicts.data(), verdicts.size());
 }
-
-struct World {
-    lw_world data = {};
-    std::shared_ptr<lw_snapshot> seen = build(); // as the tick sees it
-
-    std::shared_ptr<lw_snapshot> build() const
-    {
-        auto *snapshot = static_cast<lw_snapshot *>(std::calloc(1, sizeof(lw_snapshot)));
-        if (snapshot == nullptr)
-            throw std::bad_alloc();
-        lw_world_build(&data, snapshot);
-        return {snapshot, std::free};
-    }
-
-    bool apply(const nb::bytes &change, bool hull)
-    {
-        lw_message message;
-        if (!decode(hull ? LW_CHANNEL_HULL : LW_CHANNEL_OBSTACLES, change, message) ||
-            lw_world_apply(&data, &message.obstacles) != LW_OK)
-            return false;
-        seen = build();
-        return true;
-    }
-
-    // What a command echoes of its world.
-    nb::tuple echo() const
-    {
-        return nb::make_tuple(data.last.session, data.last.seq, data.version);
-    }
-
-    // Takes the echo of a command for a world whose history is not known.
-    void adopt(int64_t session, int64_t seq, int64_t version)
-    {
-        data.last.session = session;
-        data.last.seq = seq;
-        data.version = version;
-        seen = build();
-    }
-
-    nb::list obstacles() const
-    {
-        nb::list out;
-        for (int i = 0; i < data.count; i++) {
-            const lw_obstacle &o = data.obstacle[i];
-            out.append(nb::make_tuple(o.id, nb::make_tuple(o.p[0], o.p[1], o.p[2]), o.radius));
-        }
-        return out;
-    }
-};
 
 struct Controller {
     lw_controller config = {};
@@ -144,7 +87,7 @@ struct Controller {
     // A request counts for one tick: its repetitions change nothing.
     nb::bytes tick(int64_t time_ns, int64_t state_age_ns, bool warming_up, const World &world)
     {
-        const lw_tick_input in = {time_ns, state_age_ns, warming_up, &joint, world.seen.get(), &asked};
+        const lw_tick_input in = {time_ns, state_age_ns, warming_up, &joint, &world.look(), &asked};
         lw_message message = {};
         unsigned char wire[LW_WIRE_MAX];
         before = state;
@@ -185,22 +128,6 @@ struct Controller {
 
 void bind_replay(nb::module_ &m)
 {
-    nb::class_<World>(m, "World", "The set of obstacles that a controller believes in.")
-        .def(nb::init<>(), "Nothing heard yet.")
-        .def(
-            "copy", [](const World &w) { return w; }, "The same world, to go on from.")
-        .def("apply", &World::apply, nb::arg("change"), nb::arg("hull") = false,
-             "Takes an OBSTACLES or HULL message; False when it is refused.")
-        .def("adopt", &World::adopt, nb::arg("session"), nb::arg("seq"), nb::arg("version"),
-             "Takes the echo of a command for a world whose history is not known.")
-        .def("obstacles", &World::obstacles, "(id, (x, y, z) m, radius m) of each, in the controller's order.")
-        .def_prop_ro(
-            "channel", [](const World &w) { return w.data.last_channel; }, "Channel of the newest message.")
-        .def_prop_ro("echo", &World::echo, "Session and seq of the newest message, number of changes.")
-        .def_prop_ro(
-            "count", [](const World &w) { return w.data.count; }, "Number of obstacles.")
-        .def_prop_ro("digest", [](const World &w) { return w.data.digest; }, "Digest of the obstacles.");
-
     nb::class_<Controller>(m, "Controller", "The controller's tick, fed with messages of a log.")
         .def(nb::init<const Scene &, int64_t>(), nb::arg("scene"), nb::arg("session"),
              "A controller as its process starts; session is the one it sends with.")

@@ -3,8 +3,9 @@
 Each step of the digest is invertible. So for every single value there is exactly one that would
 lead to the recorded digest; the value that resembles what the log holds, or that has few digits,
 is the one that changed.
-The order of the values is that of `digest_input` in controller/tick.c and of `digest` in
-lib/collision/world.c; where it is not, nothing is found.
+The order of the values is that of `digest_input` in controller/explain.c and of `digest_entry` in
+lib/collision/world.c; where it is not, nothing is found. The digest of a world is the sum of those
+of its obstacles, so what the sum lacks any single one of them may lack.
 """
 
 from __future__ import annotations
@@ -120,16 +121,33 @@ def _as_float(bits: int) -> float:
     return value
 
 
-def world_words(obstacles: list[Any]) -> list[Word]:
-    """Return the values of a world; obstacles are (id, centre, radius)."""
-    words = [integer("number of obstacles", len(obstacles))]
-    for number, centre, radius in obstacles:
-        words.append(integer(f"OBSTACLES id {number}: id", number))
-        words += floats(f"OBSTACLES id {number}: p", centre)
-        words += [
-            w._replace(name=f"OBSTACLES id {number}: radius") for w in floats("radius", [radius])
-        ]
-    return words
+def obstacle_words(obstacle: Any) -> tuple[list[Word], list[Word]]:
+    """Return the values of an obstacle of `World.obstacles`, and those of its vertices."""
+    number, shape, p, quat, radius, size, v, omega, time_ns, expires_ns, vertices = obstacle
+    what = f"OBSTACLES id {number}"
+    points = floats(f"HULL id {number}: vertex", vertices)
+    corners = [integer(f"HULL id {number}: number of vertices", len(vertices) // 3), *points]
+    words = [integer(f"{what}: id", number), integer(f"{what}: shape", shape)]
+    words += floats(f"{what}: p", p) + floats(f"{what}: quat", quat)
+    words += [w._replace(name=f"{what}: radius") for w in floats("radius", [radius])]
+    words += floats(f"{what}: size", size) + floats(f"{what}: v", v)
+    words += floats(f"{what}: omega", omega)
+    words += [integer(f"{what}: time_ns", time_ns), integer(f"{what}: expiry, ns", expires_ns)]
+    return [*words, Word(VERTICES, digest(corners) if vertices else 0)], corners
+
+
+def world_changes(obstacles: Sequence[Any], wanted: int) -> list[Change]:
+    """Return the single values of obstacles whose change explains a digest of all of them."""
+    each = [obstacle_words(obstacle) for obstacle in obstacles]
+    digests = [digest(words) for words, _ in each]
+    more = wanted - sum(digests)
+    found = []
+    for (words, corners), known in zip(each, digests, strict=True):
+        own = (known + more) & MASK
+        found += changes(words, own)
+        if words[-1].bits:
+            found += changes(corners, needed(words, own)[-1])
+    return found
 
 
 def input_words(
@@ -152,8 +170,7 @@ def input_words(
     values = [state["h"][n] for n in stamp] + [state[n] for n in joint] if state else [0] * 9
     words = [integer("digest of the scene", scene_digest)]
     words += [integer(f"JOINT_STATE {n}", int(v)) for n, v in zip(names, values, strict=True)]
-    echo = zip(("session", "seq", "version"), world.echo, strict=True)
-    words.append(integer("world channel", world.channel))
+    echo = zip(("channel", "session", "seq", "version"), world.echo, strict=True)
     words += [integer(f"world {name}", value) for name, value in echo]
     words.append(integer(WORLD_DIGEST, world.digest))
     request = (int(command["request_session"]), int(command["request_seq"]))
@@ -168,7 +185,7 @@ def input_words(
     return words + floats(goal, command["goal"].tolist())
 
 
-WORLD_DIGEST = "digest of the obstacles"
+WORLD_DIGEST, VERTICES = "digest of the obstacles", "digest of the vertices"
 
 
 def explain(words: Sequence[Word], world: _native.World, recorded: int) -> list[Change]:
@@ -190,7 +207,7 @@ def explain(words: Sequence[Word], world: _native.World, recorded: int) -> list[
         return [Change("input_digest of the command", had, log, 1)]
     found = changes(words, recorded)
     place = [word.name for word in words].index(WORLD_DIGEST)
-    found += changes(world_words(world.obstacles()), needed(words, recorded)[place])
+    found += world_changes(world.obstacles(), needed(words, recorded)[place])
     # A flipped top bit looks like two flipped bits of the next value.
     least = min((change.bits for change in found), default=0)
     return [change for change in found if change.bits == least]

@@ -63,7 +63,7 @@ def _difference_lines(d: Difference) -> Iterator[str]:
     if not d.changed:
         likely = (
             " or ".join(d.suspects)
-            or "the scene, or a value of JOINT_STATE or OBSTACLES without an echo"
+            or "the scene, or a value of JOINT_STATE, OBSTACLES or HULL without an echo"
         )
         yield f"      no single value explains it; by the fields that differ: {likely}"
 

@@ -142,7 +142,7 @@ class Replay:
         self.scene = read_scene(log, self.configuration.scene)
         self.states, self.commands = log.tables["JOINT_STATE"], log.tables["JOINT_COMMAND"]
         self.rows = np.flatnonzero(self.commands.rows["h"]["session"] == session)
-        self.line = WorldLine(log.tables["OBSTACLES"])
+        self.line = WorldLine(log.tables["OBSTACLES"], log.tables["HULL"])
         self._controller = _native.Controller(self.scene, session)
         self.scene_digest = self._controller.scene_digest
         self._spans = spans(self.commands.rows.dtype)
@@ -250,7 +250,7 @@ class Replay:
         if e.request != self._controller.in_force and inputs.request is None:
             return "its GOAL or STOP is not in the log"
         if not inputs.guess.told or not self.line.known:
-            return "OBSTACLES it had taken are not in the log"
+            return "OBSTACLES or HULL it had taken are not in the log"
         return ""
 
     # --- inputs ---
@@ -316,6 +316,7 @@ class Replay:
                     strict=True,
                 ),
                 zip(
+                    c["world_channel"].tolist(),
                     c["world_session"].tolist(),
                     c["world_seq"].tolist(),
                     c["world_version"].tolist(),

@@ -19,7 +19,8 @@ PROGRESS_TICKS = 2048
 ECHOED = {
     "JOINT_STATE": {"plant_session", "state_seq", "state_tick", "state_mono_ns", "q"},
     "GOAL or STOP": {"request_session", "request_seq", "goal"},
-    "OBSTACLES": {
+    "OBSTACLES or HULL": {
+        "world_channel",
         "world_session",
         "world_seq",
         "world_version",
