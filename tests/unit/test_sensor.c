@@ -252,9 +252,9 @@ static void check_world(const struct lw_world *world)
         visible += sensor.is_seen[place];
         bool found = !sensor.is_seen[place];
         for (int i = 0; i < world->count; i++)
-            if (world->obstacle[i].id == sensor.seen[place].id) {
+            if (world->entry[i].obstacle.id == sensor.seen[place].id) {
                 found = true;
-                assert_all_near(world->obstacle[i].p, sensor.seen[place].p, 3, 0);
+                assert_all_near(world->entry[i].obstacle.p, sensor.seen[place].p, 3, 0);
             }
         assert_true(found);
     }
