@@ -102,21 +102,21 @@ static void decide(struct lw_escape *escape, const struct lw_escape_now *now)
     struct lw_rollout *rollout = &escape->rollout;
     rollout->candidate = -1;
     const int doublings = escape->attempts < PATIENCE_DOUBLINGS ? escape->attempts : PATIENCE_DOUBLINGS;
-    escape->wait_until_ns = now->time_ns + (patience_ns << doublings);
+    escape->wait_until_ns = now->tick.time_ns + (patience_ns << doublings);
     escape->attempts++;
     if (rollout->best > now->deviation - worth_m)
         return;
     memcpy(escape->circulation, rollout->best_circulation, sizeof escape->circulation);
     lw_stuck_reset(&escape->stuck);
     escape->nearest = now->deviation;
-    escape->nearest_ns = now->time_ns;
+    escape->nearest_ns = now->tick.time_ns;
 }
 
 // Goes on with a roll-out by as many steps as a tick may take.
 static void roll_on(struct lw_escape *escape, const struct lw_escape_model *model, const struct lw_escape_now *now)
 {
     struct lw_rollout *rollout = &escape->rollout;
-    for (int64_t left_ns = now->period_ns; left_ns > 0 && rollout->candidate >= 0; left_ns -= share_ns) {
+    for (int64_t left_ns = now->tick.period_ns; left_ns > 0 && rollout->candidate >= 0; left_ns -= share_ns) {
         const double deviation = roll(rollout, model, now);
         if (++rollout->steps < STEPS)
             continue;
@@ -136,23 +136,23 @@ static bool is_idle(struct lw_escape *escape, const struct lw_escape_now *now)
 {
     if (escape->nearest_ns == 0 || now->deviation < escape->nearest - worth_m) {
         escape->nearest = now->deviation;
-        escape->nearest_ns = now->time_ns;
+        escape->nearest_ns = now->tick.time_ns;
     }
-    return now->time_ns - escape->nearest_ns > progress_ns;
+    return now->tick.time_ns - escape->nearest_ns > progress_ns;
 }
 
 bool lw_escape_step(struct lw_escape *escape, const struct lw_escape_model *model, const struct lw_escape_now *now)
 {
     const double tolerance = model->law->tolerance(model->params);
-    const bool stuck = lw_stuck_note(&escape->stuck, now->deviation, tolerance, now->period_ns, now->time_ns);
+    const bool stuck = lw_stuck_note(&escape->stuck, now->deviation, tolerance, &now->tick);
     if (model->params->remedy.kind != LW_REMEDY_ROLLOUT)
         return stuck;
     const bool arrived = now->deviation < tolerance, idle = is_idle(escape, now) && !arrived;
     if (arrived)
         memset(escape->circulation, 0, sizeof escape->circulation);
-    if ((stuck || idle) && escape->rollout.candidate < 0 && now->time_ns >= escape->wait_until_ns) {
+    if ((stuck || idle) && escape->rollout.candidate < 0 && now->tick.time_ns >= escape->wait_until_ns) {
         struct lw_rollout *rollout = &escape->rollout;
-        rollout->from_ns = now->time_ns;
+        rollout->from_ns = now->tick.time_ns;
         rollout->best = HUGE_VAL;
         memcpy(rollout->from_q, now->q, sizeof rollout->from_q);
         memcpy(rollout->from_velocity, now->velocity, sizeof rollout->from_velocity);

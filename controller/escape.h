@@ -33,7 +33,7 @@ struct lw_escape_now {
     const double *q, *velocity; // [6] rad, [6] rad/s
     const double *tip, *goal;   // [3] m
     double deviation;           // m
-    int64_t time_ns, period_ns;
+    struct lw_stuck_tick tick;
 };
 
 // A roll-out in progress.

@@ -13,7 +13,6 @@ static const int64_t sample_ns = 8 * 1000 * 1000, window_ns = 800 * 1000 * 1000;
 
 void lw_stuck_reset(struct lw_stuck *stuck)
 {
-    stuck->ticks = 0;
     stuck->count = 0;
     stuck->since_ns = 0;
 }
@@ -36,19 +35,18 @@ static bool is_still(const struct lw_stuck *stuck, int count)
     return high - low < band;
 }
 
-bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, int64_t period_ns, int64_t time_ns)
+bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, const struct lw_stuck_tick *at)
 {
-    const int64_t every = periods_in(sample_ns, period_ns);
-    const int length = (int)periods_in(window_ns, every * period_ns) + 1; // at most LW_STUCK_SAMPLES
-    const int64_t tick = stuck->ticks++;
-    if (tick % every != 0)
+    const int64_t every = periods_in(sample_ns, at->period_ns);
+    const int length = (int)periods_in(window_ns, every * at->period_ns) + 1; // at most LW_STUCK_SAMPLES
+    if (at->number % every != 0)
         return stuck->since_ns != 0;
-    stuck->deviation[tick / every % length] = deviation;
+    stuck->deviation[at->number / every % length] = deviation;
     stuck->count = stuck->count < length ? stuck->count + 1 : length;
     const bool still = stuck->count == length && deviation > tolerance && is_still(stuck, length);
     if (!still)
         stuck->since_ns = 0;
     else if (stuck->since_ns == 0)
-        stuck->since_ns = time_ns;
+        stuck->since_ns = at->time_ns;
     return still;
 }

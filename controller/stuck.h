@@ -14,8 +14,14 @@
 
 enum { LW_STUCK_SAMPLES = 101 };
 
+// The tick that asks.
+struct lw_stuck_tick {
+    int64_t number;    // 1, 2, 3 ...
+    int64_t period_ns; // from one to the next
+    int64_t time_ns;   // > 0 once motion has begun
+};
+
 struct lw_stuck {
-    int64_t ticks;                      // since it began to watch
     int count;                          // samples taken, up to LW_STUCK_SAMPLES
     double deviation[LW_STUCK_SAMPLES]; // m, a ring
     int64_t since_ns;                   // tick's time; 0 = not stuck
@@ -26,9 +32,9 @@ void lw_stuck_reset(struct lw_stuck *stuck);
 
 // Takes the deviation of one tick. Stuck means: farther than `tolerance` from the goal, and over the last 0.8 s the
 // deviation stayed within a band of 1 cm. Slow motion is not told apart from rest: below 12.5 mm/s counts as stuck.
-//   period_ns  in  of the tick; samples are 8 ms apart, or one a tick where that is longer
-//   time_ns    in  the tick's time, > 0 once motion has begun
+//   at  in  the tick; samples are 8 ms apart, at the same ticks whenever it began to watch, or one a tick where that is
+//           longer
 // Returns whether it is stuck. Cost: fixed, every 8 ms a pass over 101 numbers.
-bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, int64_t period_ns, int64_t time_ns);
+bool lw_stuck_note(struct lw_stuck *stuck, double deviation, double tolerance, const struct lw_stuck_tick *at);
 
 #endif

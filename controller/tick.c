@@ -170,14 +170,14 @@ static void escape(const struct lw_controller *config, struct lw_controller_stat
                                           .limits = &config->limits,
                                           .arm = config->arm,
                                           .body = &config->body};
-    const struct lw_escape_now now = {.world = in->world,
-                                      .q = in->joint->q,
-                                      .velocity = state->velocity,
-                                      .tip = around->frame[LW_NJ - 1].p,
-                                      .goal = state->request.goal,
-                                      .deviation = out->deviation,
-                                      .time_ns = in->time_ns,
-                                      .period_ns = config->period_ns};
+    const struct lw_escape_now now = {
+        .world = in->world,
+        .q = in->joint->q,
+        .velocity = state->velocity,
+        .tip = around->frame[LW_NJ - 1].p,
+        .goal = state->request.goal,
+        .deviation = out->deviation,
+        .tick = {.number = state->tick, .period_ns = config->period_ns, .time_ns = in->time_ns}};
     if (lw_escape_step(&state->escape, &model, &now))
         out->law_outcome = LW_LAW_STUCK;
     out->stuck_since_ns = state->escape.stuck.since_ns;

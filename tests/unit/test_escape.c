@@ -35,7 +35,7 @@ struct rig {
     struct lw_body body;
     struct lw_escape escape;
     double q[LW_NJ], velocity[LW_NJ], goal[3];
-    int64_t period_ns, time_ns;
+    int64_t period_ns, time_ns, ticks;
     // of the last tick
     double deviation, clearance;
     bool stuck;
@@ -111,14 +111,14 @@ static void go(struct rig *rig)
                                           .limits = &rig->limits,
                                           .arm = lw_arm_get(LW_UR5),
                                           .body = &rig->body};
-    const struct lw_escape_now now = {.world = &world,
-                                      .q = rig->q,
-                                      .velocity = rig->velocity,
-                                      .tip = tip,
-                                      .goal = rig->goal,
-                                      .deviation = rig->deviation,
-                                      .time_ns = rig->time_ns,
-                                      .period_ns = rig->period_ns};
+    const struct lw_escape_now now = {
+        .world = &world,
+        .q = rig->q,
+        .velocity = rig->velocity,
+        .tip = tip,
+        .goal = rig->goal,
+        .deviation = rig->deviation,
+        .tick = {.number = ++rig->ticks, .period_ns = rig->period_ns, .time_ns = rig->time_ns}};
     rig->stuck = lw_escape_step(&rig->escape, &model, &now);
     const struct lw_guard_input guard = {
         .limits = &rig->limits, .period_s = period_s, .q = rig->q, .velocity = rig->velocity, .wish = wish};

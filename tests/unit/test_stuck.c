@@ -12,11 +12,17 @@
 static const double tolerance = 0.05;
 static const int64_t ms = 1000000;
 
+static bool note(struct lw_stuck *stuck, double deviation, int64_t number, int64_t period_ns)
+{
+    const struct lw_stuck_tick at = {.number = number, .period_ns = period_ns, .time_ns = (number + 1) * period_ns};
+    return lw_stuck_note(stuck, deviation, tolerance, &at);
+}
+
 // Notes a deviation again and again; returns the number of the tick that first finds it stuck, -1 = none did.
 static int first_stuck(struct lw_stuck *stuck, double deviation, int ticks, int64_t period_ns)
 {
     for (int k = 0; k < ticks; k++)
-        if (lw_stuck_note(stuck, deviation, tolerance, period_ns, (k + 1) * period_ns))
+        if (note(stuck, deviation, k, period_ns))
             return k;
     return -1;
 }
@@ -57,7 +63,7 @@ static void motion_is_told_from_standstill(void **state)
             const double step = sign * (wide ? 1.0001e-4 : 0.9999e-4); // 100 steps within the window
             bool found = false;
             for (int k = 0; k < 400; k++)
-                found |= lw_stuck_note(&stuck, 0.5 + k * step, tolerance, 8 * ms, (k + 1) * 8 * ms);
+                found |= note(&stuck, 0.5 + k * step, k, 8 * ms);
             assert_int_equal(found, !wide);
         }
 }
@@ -69,11 +75,14 @@ static void since_when(void **state)
     struct lw_stuck stuck = {0};
     const int k = first_stuck(&stuck, 0.3, 1000, 8 * ms);
     for (int i = 1; i < 50; i++)
-        assert_true(lw_stuck_note(&stuck, 0.3, tolerance, 8 * ms, (k + 1 + i) * 8 * ms));
+        assert_true(note(&stuck, 0.3, k + i, 8 * ms));
     assert_int_equal(stuck.since_ns, (k + 1) * 8 * ms);
-    assert_false(lw_stuck_note(&stuck, 0.28, tolerance, 8 * ms, 9999 * ms));
+    assert_false(note(&stuck, 0.28, k + 50, 8 * ms));
     assert_int_equal(stuck.since_ns, 0);
-    assert_int_equal(first_stuck(&stuck, 0.28, 1000, 8 * ms), 99);
+    int more = 1;
+    while (!note(&stuck, 0.28, k + 50 + more, 8 * ms))
+        more++;
+    assert_int_equal(more, 100);
     lw_stuck_reset(&stuck);
     assert_int_equal(stuck.since_ns, 0);
     assert_int_equal(first_stuck(&stuck, 0.28, 1000, 8 * ms), 100);
@@ -87,8 +96,25 @@ static void ticks_between_samples_repeat_the_answer(void **state)
     const int k = first_stuck(&stuck, 0.3, 1000, 2 * ms);
     assert_int_equal(k % 4, 0);
     for (int i = 1; i < 4; i++)
-        assert_true(lw_stuck_note(&stuck, 9, tolerance, 2 * ms, (k + 1 + i) * 2 * ms));
-    assert_false(lw_stuck_note(&stuck, 9, tolerance, 2 * ms, (k + 5) * 2 * ms));
+        assert_true(note(&stuck, 9, k + i, 2 * ms));
+    assert_false(note(&stuck, 9, k + 4, 2 * ms));
+}
+
+// Whoever begins to watch later samples at the same ticks, and comes to the same answer once it has seen enough.
+static void a_later_watcher_comes_to_the_same(void **state)
+{
+    (void)state;
+    struct random random = {5};
+    for (int late = 1; late < 9; late++) {
+        struct lw_stuck one = {0}, two = {0};
+        double deviation = 0.5;
+        for (int64_t k = 1; k < 3000; k++) {
+            deviation += random_in(&random, -2e-4, 2e-4) * (k % 1000 < 600);
+            const bool first = note(&one, deviation, k, 2 * ms), second = k > late && note(&two, deviation, k, 2 * ms);
+            if (k > late + 408)
+                assert_true(first == second);
+        }
+    }
 }
 
 // A deviation that is no number is not a standstill.
@@ -101,9 +127,12 @@ static void no_number_is_no_standstill(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(standstill_is_found_after_its_time),      cmocka_unit_test(the_goal_is_no_trap),
-        cmocka_unit_test(motion_is_told_from_standstill),          cmocka_unit_test(since_when),
-        cmocka_unit_test(ticks_between_samples_repeat_the_answer), cmocka_unit_test(no_number_is_no_standstill)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(standstill_is_found_after_its_time),
+                                       cmocka_unit_test(the_goal_is_no_trap),
+                                       cmocka_unit_test(motion_is_told_from_standstill),
+                                       cmocka_unit_test(since_when),
+                                       cmocka_unit_test(ticks_between_samples_repeat_the_answer),
+                                       cmocka_unit_test(a_later_watcher_comes_to_the_same),
+                                       cmocka_unit_test(no_number_is_no_standstill)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

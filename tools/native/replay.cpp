@@ -112,6 +112,13 @@ struct Controller {
         std::copy(qd.begin(), qd.end(), state.velocity);
     }
 
+    // What the tick remembers beyond the last command, as far as a command tells it.
+    void adopt_memory(int64_t stuck_since_ns, const std::array<double, 3> &circulation)
+    {
+        state.escape.stuck.since_ns = stuck_since_ns;
+        std::copy(circulation.begin(), circulation.end(), state.escape.circulation);
+    }
+
     void adopt_request(int64_t session, int64_t seq, bool stop, const std::array<double, 3> &goal)
     {
         lw_request request = {};
@@ -144,6 +151,11 @@ void bind_replay(nb::module_ &m)
             "undo", [](Controller &c) { c.state = c.before; }, "Back to before the last tick.")
         .def("adopt", &Controller::adopt, nb::arg("tick"), nb::arg("plant_session"), nb::arg("state_seq"),
              nb::arg("qd"), "Goes on from a recorded command whose own inputs are not known.")
+        .def("adopt_memory", &Controller::adopt_memory, nb::arg("stuck_since_ns"), nb::arg("circulation"),
+             "Sets what it remembers of being stuck to what a recorded command tells.")
+        .def_prop_ro(
+            "looks_back", [](const Controller &c) { return c.config.params.remedy.kind == LW_REMEDY_ROLLOUT; },
+            "Whether commands depend on more than the last second.")
         .def("adopt_request", &Controller::adopt_request, nb::arg("session"), nb::arg("seq"), nb::arg("stop"),
              nb::arg("goal"), "Sets the request in force to that of a recorded command.")
         .def_prop_ro("in_force", &Controller::in_force,

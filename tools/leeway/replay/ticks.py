@@ -25,6 +25,12 @@ CHUNK = 8192  # ticks whose echoes are unpacked at a time
 FILLED_BY_PROCESS = ("h", "compute_ns", "wake_late_ns", "previous_exec_ns", "skipped")
 
 
+# What a tick says of its own memory; without hulls and roll-outs nothing else depends on it.
+MEMORY = ("law_outcome", "stuck_since_ns", "circulation")
+MEMORY_NS = 900_000_000  # stuck is judged over 0.8 s
+WARM_TICKS = 256  # LW_WARM_TICKS: distances of hulls begin anew
+
+
 class Verdict(Enum):
     """What came of a tick."""
 
@@ -151,6 +157,7 @@ class Replay:
         self._last = b""  # command computed last
         self._last_seq = 0
         self._last_ns = 0  # its tick_ns
+        self._resumed: _Echoes | None = None  # where it went on without a memory of its own
 
     def __iter__(self) -> Iterator[Outcome]:
         for start in range(0, len(self.rows), CHUNK):
@@ -183,6 +190,7 @@ class Replay:
         controller.adopt(int(c["tick"]), *plant, c["qd"].tolist())
         request = (int(c["request_session"]), int(c["request_seq"]))
         controller.adopt_request(*request, bool(c["flags"] & STOPPED), c["goal"].tolist())
+        controller.adopt_memory(int(c["stuck_since_ns"]), c["circulation"].tolist())
 
     # --- one command ---
 
@@ -209,6 +217,7 @@ class Replay:
         lost = 0 if begin else max(0, e.tick - self._controller.ticks - 1)
         outcome = self._compute(e)
         self._adopt(e.row)
+        self._resumed = e
         return outcome._replace(verdict=Verdict.UNKNOWN, reason=reason, lost=lost)
 
     def _compute(self, e: _Echoes) -> Outcome:
@@ -240,8 +249,33 @@ class Replay:
 
     def _judge(self, e: _Echoes, inputs: Inputs, command: bytes, right: bool) -> Outcome:
         self._last = command
-        verdict = Verdict.EQUAL if self.same(e.row, command) else Verdict.DIFFERS
-        return Outcome(e.row, verdict, "", inputs, command, right)
+        if self.same(e.row, command):
+            return Outcome(e.row, Verdict.EQUAL, "", inputs, command, right)
+        if right and self._may_forget(e, command):
+            self._adopt(e.row)
+            reason = "what it remembered is older than the log"
+            return Outcome(e.row, Verdict.UNKNOWN, reason, inputs, command, right)
+        return Outcome(e.row, Verdict.DIFFERS, "", inputs, command, right)
+
+    def _may_forget(self, e: _Echoes, command: bytes) -> bool:
+        """Whether a command may differ because its history began before the log."""
+        start = self._resumed
+        if start is None:
+            return False
+        seen = e.tick_ns - start.tick_ns > MEMORY_NS and e.tick > start.tick + WARM_TICKS
+        if seen and not self._controller.looks_back:
+            self._resumed = None
+            return False
+        if self._controller.looks_back or len(self.line.hulls):
+            return True
+        layout = self.commands.rows.dtype
+        recorded = self.commands.message(e.row)
+        return all(
+            recorded[at + 8 : at + 8 + size] == command[at + 8 : at + 8 + size]
+            for name in layout.names or ()
+            if name not in (*MEMORY, *FILLED_BY_PROCESS)
+            for at, size in [_field(layout, name)]
+        )
 
     def _missing(self, e: _Echoes, inputs: Inputs | None) -> str:
         """Say which input of a tick the log lacks, "" when it has all."""
