@@ -112,6 +112,7 @@ class Run:
         m.qd = m.qd_law = [speed, 0, 0, 0, 0, 0]
         m.goal = [0.5, -0.6, 0.5]
         m.world_session, m.world_seq, m.world_version, m.obstacle_count = PLANT, 1, 1, 1
+        m.world_channel = m.OBSTACLES
         m.tick, m.tick_ns = k + 1, k * PERIOD_NS
         m.wake_late_ns, m.previous_exec_ns, m.state_age_ns = 20_000 + k, 30_000 + k, 4_000_000
         origins = _native.Arm("ur5").frames(np.array(m.q))[1:, :3, 3]

@@ -142,7 +142,7 @@ def test_world_agrees_with_a_plain_model(
             see(run, slice(k, None), session, k + 1)
         expected.append(expected[-1] if after is None else after)
     log = read_log(run.write(tmp_path_factory.mktemp("world")))
-    line = follow(log.obstacles, log.commands)
+    line = follow(log.obstacles, log.hulls, log.commands)
     found = [{o.id: (o.p[0], o.radius, o.session) for o in line.worlds[i]} for i in line.index]
     assert found[: len(expected)] == expected
     assert line.unknown_ticks == 0
@@ -154,7 +154,7 @@ def test_nearest_is_the_smallest_over_all_obstacles(tmp_path: Path) -> None:
     run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, items))
     log = read_log(run.write(tmp_path))
     points = np.random.default_rng(1).normal(size=(3, 6, 3))
-    distance, obstacle = nearest(points, follow(log.obstacles, log.commands))
+    distance, obstacle = nearest(points, follow(log.obstacles, log.hulls, log.commands))
     for row, column in np.ndindex(3, 6):
         each = {k: float(np.linalg.norm(points[row, column] - p)) - r for k, p, r in items}
         best = min(each, key=lambda k: each[k])

@@ -214,7 +214,7 @@ def analyse(log: Log) -> Analysis:
     if not np.isfinite(points).any():
         raise LogError(f"{log.path}: no joint position in its commands is a number")
     goal = _goal_in_force(commands, scene["request"]["goal"])
-    line = follow(log.obstacles, commands)
+    line = follow(log.obstacles, log.hulls, commands)
     distances, obstacle = nearest(points, line)
     uses = limit_uses(scene, motion)
     lockstep = scene_message.mode == "lockstep"

@@ -6,14 +6,14 @@ Units are s of motion and m.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from leeway.logs.log import Floats, Ints, Log, Messages, Statuses
 from leeway.logs.motion import ENDED, HOLD, MOVING, STOPPING, Motion
 from leeway.logs.programs import statuses_of
-from leeway.logs.world import Obstacle, World, WorldLine
+from leeway.logs.world import World, WorldLine
 from leeway.status import fault_names
 
 STOPPED, STALE, NOT_FINITE, FOREIGN = 8, 16, 32, 128
@@ -85,11 +85,6 @@ def _point(p: Floats | tuple[float, float, float]) -> str:
     return "(" + ", ".join(f"{float(v):g}" for v in np.round(p, 4)) + ") m"
 
 
-def _shape(obstacle: Obstacle) -> str:
-    size = f"sphere of radius {obstacle.radius:g} m" if obstacle.radius else "point"
-    return f"{size} at {_point(obstacle.p)}"
-
-
 # --- obstacles ---
 
 
@@ -132,9 +127,9 @@ def _changes(
             source = sources.get(
                 new[number].session, f"another source, session {new[number].session}"
             )
-            yield number, f"{verb}: {_shape(new[number])}, from {source}", False
-        elif (old[number].p, old[number].radius) != (new[number].p, new[number].radius):
-            yield number, f"changed: now {_shape(new[number])}", True
+            yield number, f"{verb}: {new[number].words}, from {source}", False
+        elif replace(old[number], session=0) != replace(new[number], session=0):
+            yield number, f"changed: now {new[number].words}", True
 
 
 # --- requests ---

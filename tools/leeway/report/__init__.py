@@ -20,10 +20,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from leeway.logs.analysis import Analysis
+from leeway.logs.solids import HALFSPACE, Obstacle
 from leeway.report import figures, pose
+from leeway.report.solids import polygon_in
 
 PAGE = "report.html"
-FRAMES_MAX = 400
+FRAMES_MAX, FRAMES_MIN = 400, 50
+SOLIDS_MAX = 20000  # in all frames of the 3-D view: more make the page slow
+PLANE_HALF = 1.2  # m: planes are shown this far around the base
 PNG_DPI = 160
 DIGITS = 4  # of positions in the 3-D view: a tenth of a millimetre
 
@@ -174,27 +178,43 @@ def _comparison(runs: list[tuple[str, Analysis]], write: _Writer) -> dict[str, P
 def view_data(a: Analysis) -> dict[str, Any]:
     """Return what the 3-D view moves: at most 400 frames, with the last tick among them.
 
+    Each solid has its core points c, which a ball of radius r sweeps; planes have corners.
+
     Returns
     -------
     dict
         t (k) s, arm (k, 18) m, world (k) and goal (k) indices, worlds, goals, rho.
     """
-    rows = np.unique(np.linspace(0, a.ticks - 1, min(a.ticks, FRAMES_MAX)).round().astype(int))
+    most = max((len(world) for world in a.world.worlds), default=0)
+    frames = int(np.clip(SOLIDS_MAX // max(most, 1), FRAMES_MIN, FRAMES_MAX))
+    rows = np.unique(np.linspace(0, a.ticks - 1, min(a.ticks, frames)).round().astype(int))
     rows = rows[np.isfinite(a.points[rows]).all(axis=(1, 2))]
     goals, goal_index = np.unique(a.goal[rows], axis=0, return_inverse=True)
-    worlds = [
-        [{"id": o.id, "p": _rounded(np.array(o.p)), "r": round(o.radius, DIGITS)} for o in world]
-        for world in a.world.worlds
-    ]
+    shown, world_index = np.unique(a.world.index[rows], return_inverse=True)
+    worlds = [[_solid(o) for o in a.world.worlds[k]] for k in shown]
     return {
         "t": _rounded(a.t[rows]),
         "arm": [_rounded(points.ravel()) for points in a.points[rows]],
-        "world": a.world.index[rows].tolist(),
+        "world": world_index.ravel().tolist(),
         "worlds": worlds,
         "goal": goal_index.ravel().tolist(),
         "goals": [_rounded(goal) for goal in goals],
         "rho": a.rho,
     }
+
+
+def _solid(o: Obstacle) -> dict[str, Any]:
+    """Return what the 3-D view draws of an obstacle."""
+    plane = o.shape == HALFSPACE
+    half = np.full(3, PLANE_HALF)
+    core = polygon_in(o, -half, half) if plane else o.core
+    solid = {
+        "id": o.id,
+        "p": _rounded(np.array(o.p)),
+        "r": round(o.radius, DIGITS),
+        "c": [_rounded(point) for point in core],
+    }
+    return solid | ({"plane": True} if plane else {})
 
 
 def _rounded(values: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:

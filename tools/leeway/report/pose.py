@@ -14,31 +14,40 @@ from matplotlib.figure import Figure
 
 from leeway.logs.analysis import Analysis
 from leeway.logs.log import Floats
+from leeway.logs.solids import HALFSPACE, SPHERE, Obstacle
 from leeway.report.figures import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, RED, RHO, STYLES
+from leeway.report.solids import draw_arm, draw_obstacle
 
 POSES = 5
 OUTLINES_MAX = 4  # influence spheres drawn: more hide the arm
+NAMES_MAX = 12  # names of obstacles written: more cannot be read
+FEW = 12  # obstacles drawn strongly
+MOVED = 0.02  # m: an obstacle that was so far off is drawn where it was, too
+NEAR = 1.6  # m from the base: what is beyond must not make the arm tiny
 VIEW = {"elev": 26.0, "azim": -64.0}
 
 
 def scene_picture(a: Analysis) -> Figure:
     """The arm from start (faint) to end (strong), goal, obstacles with their reach, path."""
     figure, axes = _space()
-    lower, upper = _box([a])
-    _draw_obstacles(axes, a, lower, upper)
     rows = np.unique(_even_rows(a))
+    lower, upper = _box([a])
+    _draw_obstacles(axes, a, rows, (lower, upper))
     for k, row in enumerate(rows):
         joints = np.vstack([np.zeros(3), a.points[row]])
         last = k == len(rows) - 1
-        alpha = 1.0 if last else 0.25 + 0.35 * k / max(len(rows) - 1, 1)
+        strength = 1.0 if last else 0.25 + 0.35 * k / max(len(rows) - 1, 1)
         label = f"arm at {a.t[row]:.2f} s" if k in (0, len(rows) - 1) else None
+        colour = INK if last else GREY
+        if k in (0, len(rows) - 1):
+            draw_arm(axes, a.robot, a.q[row], BLUE if last else GREY, 0.3 * strength, 18 + last)
         axes.plot(
             *joints.T,
             "-o",
-            color=INK if last else GREY,
+            color=colour,
             lw=4 if last else 2.2,
             ms=5,
-            alpha=alpha,
+            alpha=strength,
             label=label,
             zorder=20 + k,
         )
@@ -88,8 +97,8 @@ def compare_paths(runs: Sequence[tuple[str, Analysis]]) -> Figure:
     for k, goal in enumerate(goals.values()):
         name = "goal" if k == 0 else None
         axes.plot(*goal[:, None], marker="*", ms=15, color=GREEN, ls="", label=name, zorder=31)
-    for obstacle, centre, radius in _obstacles(runs[0][1]):
-        _ball(axes, centre, radius, obstacle)
+    first = runs[0][1]
+    _draw_at(axes, _obstacles(first), _left(first), (lower, upper))
     axes.plot(
         [0, 0],
         [0, 0],
@@ -141,28 +150,34 @@ def _goals(a: Analysis) -> list[Floats]:
     return [a.goal[row] for row in np.r_[0, edges]]
 
 
-def _obstacles(a: Analysis) -> list[tuple[str, Floats, float]]:
-    """Return name, centre and radius of every obstacle of the run, where it was last."""
+def _obstacles(a: Analysis) -> list[Obstacle]:
+    """Return every obstacle of the run, where it was last."""
     firsts = np.r_[0, np.flatnonzero(np.diff(a.world.index)) + 1]
     last = {o.id: o for row in firsts for o in a.world.worlds[a.world.index[row]]}
-    left = {o.id for o in a.world.worlds[a.world.index[-1]]}
-    return [
-        (f"obstacle {o.id}" + ("" if o.id in left else " (removed)"), np.array(o.p), o.radius)
-        for o in last.values()
-    ]
+    return list(last.values())
+
+
+def _left(a: Analysis) -> set[int]:
+    """Return the ids of the obstacles that are there at the end."""
+    return {o.id for o in a.world.worlds[a.world.index[-1]]}
+
+
+def _nearest_row(a: Analysis) -> int:
+    """Return the tick with the smallest distance to an obstacle, the last one without any."""
+    return int(np.argmin(np.abs(a.t - a.smallest.t))) if np.isfinite(a.smallest.t) else -1
 
 
 def _box(runs: list[Analysis]) -> tuple[Floats, Floats]:
-    """Return a cube around arm, goals and obstacles' surfaces."""
+    """Return a cube around arm, goals and obstacles near it."""
     clouds = [np.zeros((1, 3))]
     for a in runs:
         clouds += [a.points.reshape(-1, 3), a.goal]
-        clouds += [
-            centre + radius * np.array([[-1.0], [1.0]]) for _, centre, radius in _obstacles(a)
-        ]
+        for o in [*_obstacles(a), *a.world.worlds[a.world.index[_nearest_row(a)]]]:
+            if o.shape != HALFSPACE and np.linalg.norm(o.p) < NEAR:
+                clouds += [o.core - o.radius, o.core + o.radius]
     cloud = np.vstack(clouds)
     cloud = cloud[np.isfinite(cloud).all(axis=1)]
-    cloud = cloud[(np.abs(cloud) < 3).all(axis=1)]  # what is far away must not make the arm tiny
+    cloud = cloud[(np.abs(cloud) < 3).all(axis=1)]
     lower, upper = cloud.min(axis=0), cloud.max(axis=0)
     upper[2] = max(upper[2], lower[2] + 0.9)
     middle, half = (lower + upper) / 2, 1.06 * np.maximum((upper - lower) / 2, [0.4, 0.4, 0.5])
@@ -182,26 +197,44 @@ def _set_box(axes: Any, lower: Floats, upper: Floats) -> None:
         artist.set_clip_on(False)  # the square that 3-D axes clip to is smaller than the picture
 
 
-def _draw_obstacles(axes: Any, a: Analysis, lower: Floats, upper: Floats) -> None:
-    for k, (name, centre, radius) in enumerate(_obstacles(a)):
-        _ball(axes, centre, radius, name)
-        if k < OUTLINES_MAX:
-            label = f"reach {RHO} = {a.rho:g} m" if k == 0 else None
-            _outline(axes, centre, radius + a.rho, (lower, upper), label)
+def _draw_obstacles(axes: Any, a: Analysis, rows: Any, box: tuple[Floats, Floats]) -> None:
+    """Draw the obstacles where they were last; faintly where they were nearest or at a pose."""
+    obstacles = _obstacles(a)
+    _draw_at(axes, obstacles, _left(a), box)
+    last = {o.id: o for o in obstacles}
+    nearest = _nearest_row(a)
+    for row in (*rows[:-1], nearest):
+        for o in a.world.worlds[a.world.index[row]]:
+            if np.linalg.norm(np.subtract(o.p, last[o.id].p)) > MOVED and _is_in(o, box):
+                draw_obstacle(axes, o, box, RED, 0.3 if row == nearest else 0.12)
+    balls = [o for o in obstacles if o.shape == SPHERE][:OUTLINES_MAX]
+    for k, o in enumerate(balls if len(obstacles) <= NAMES_MAX else []):
+        label = f"reach {RHO} = {a.rho:g} m" if k == 0 else None
+        _outline(axes, np.array(o.p), o.radius + a.rho, box, label)
 
 
-def _ball(axes: Any, centre: Floats, radius: float, name: str) -> None:
-    """Draw an obstacle and its name."""
-    if radius > 0:
-        u, v = np.mgrid[0 : 2 * np.pi : 24j, 0 : np.pi : 13j]
-        ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)])
-        axes.plot_surface(
-            *(centre[:, None, None] + radius * ball), color=RED, alpha=0.75, linewidth=0, zorder=15
-        )
-    else:
-        axes.plot(*centre[:, None], marker="o", ms=8, color=RED, mec=INK, ls="", zorder=15)
-    x, y, z = centre
-    axes.text(x, y, z + radius + 0.05, name, color=INK, fontsize=9, ha="center", zorder=40)
+def _draw_at(
+    axes: Any, obstacles: list[Obstacle], left: set[int], box: tuple[Floats, Floats]
+) -> None:
+    """Draw obstacles that are near, with their names when they are few."""
+    few = len(obstacles) <= FEW
+    for o in obstacles:
+        if not _is_in(o, box):
+            continue
+        if o.shape == SPHERE and o.radius == 0:
+            axes.plot(*np.array(o.p)[:, None], marker="o", ms=8, color=RED, mec=INK, zorder=15)
+        else:
+            draw_obstacle(axes, o, box, RED, 0.6 if few else 0.3)
+        if len(obstacles) <= NAMES_MAX:
+            name = f"obstacle {o.id}" + ("" if o.id in left else " (removed)")
+            x, y, z = np.clip(o.p, box[0], box[1]) if o.shape == HALFSPACE else o.p
+            top = z if o.shape == HALFSPACE else o.core[:, 2].max() + o.radius
+            axes.text(x, y, top + 0.05, name, color=INK, fontsize=9, ha="center", zorder=40)
+
+
+def _is_in(o: Obstacle, box: tuple[Floats, Floats]) -> bool:
+    """Whether the middle of an obstacle lies in the picture; a plane may always."""
+    return o.shape == HALFSPACE or bool(((o.p >= box[0]) & (o.p <= box[1])).all())
 
 
 def _outline(
