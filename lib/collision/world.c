@@ -150,6 +150,7 @@ static void drop(struct lw_world *world, int at)
     release_vertices(world, &world->entry[at]);
     forget_id(world, world->entry[at].obstacle.id);
     if (at < last) {
+        // NOLINTNEXTLINE(clang-analyzer-security.ArrayBound): both are places of entries
         world->slot[slot_of(world, world->entry[last].obstacle.id)] = at + 1;
         world->entry[at] = world->entry[last];
         world->owner[at] = world->owner[last];
