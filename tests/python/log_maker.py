@@ -53,6 +53,17 @@ def obstacles(
     return m
 
 
+def hull(
+    session: int, seq: int, number: int, p: tuple[float, ...], vertices: list[tuple[float, ...]]
+) -> Any:
+    """Return a HULL message."""
+    m = stamp(wire.hull_t(), session, seq)
+    m.o.id, m.o.shape, m.o.p, m.o.quat = number, m.o.HULL, p, [1, 0, 0, 0]
+    m.n = len(vertices)
+    m.vertex[: m.n] = [list(v) for v in vertices]
+    return m
+
+
 def scene(session: int, program: str = "leeway-controller", **fields: str) -> Any:
     """Return a SCENE message."""
     m = stamp(wire.scene_t(), session, 1)
@@ -151,7 +162,7 @@ class Run:
         """Return the log."""
         events = [
             event(
-                name if name == "OBSTACLES" else prefix + name,
+                name if name in ("OBSTACLES", "HULL") else prefix + name,
                 m if isinstance(m, bytes) else m.encode(),
                 k,
             )
@@ -174,10 +185,11 @@ def texts(a: Analysis, kind: str) -> list[str]:
     return [f"{event.t:.3f} {event.text}" for event in a.events if event.kind == kind]
 
 
-def see(run: Run, rows: slice, session: int, seq: int) -> None:
-    """Make commands echo an OBSTACLES message."""
+def see(run: Run, rows: slice, session: int, seq: int, hull: bool = False) -> None:
+    """Make commands echo an OBSTACLES or HULL message."""
     for command in run.commands[rows]:
         command.world_session, command.world_seq = session, seq
+        command.world_channel = command.HULL if hull else command.OBSTACLES
 
 
 def set_limits(run: Run, lines: str) -> None:

@@ -15,13 +15,14 @@ from log_maker import (
     SOURCE,
     Run,
     analysed,
+    hull,
     obstacles,
     see,
     texts,
 )
 
 from leeway.logs.log import read_log
-from leeway.logs.world import follow, nearest
+from leeway.logs.world import follow
 
 PERIOD = PERIOD_NS * 1e-9
 DAMAGED = Run(ticks=8)
@@ -142,7 +143,7 @@ def test_world_agrees_with_a_plain_model(
             see(run, slice(k, None), session, k + 1)
         expected.append(expected[-1] if after is None else after)
     log = read_log(run.write(tmp_path_factory.mktemp("world")))
-    line = follow(log.obstacles, log.hulls, log.commands)
+    line = follow(log, log.commands, np.zeros((len(log.commands), 6, 3))).line
     found = [{o.id: (o.p[0], o.radius, o.session) for o in line.worlds[i]} for i in line.index]
     assert found[: len(expected)] == expected
     assert line.unknown_ticks == 0
@@ -154,12 +155,65 @@ def test_nearest_is_the_smallest_over_all_obstacles(tmp_path: Path) -> None:
     run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, items))
     log = read_log(run.write(tmp_path))
     points = np.random.default_rng(1).normal(size=(3, 6, 3))
-    distance, obstacle = nearest(points, follow(log.obstacles, log.hulls, log.commands))
+    around = follow(log, log.commands, points)
+    distance, obstacle = around.distance, around.obstacle
     for row, column in np.ndindex(3, 6):
         each = {k: float(np.linalg.norm(points[row, column] - p)) - r for k, p, r in items}
         best = min(each, key=lambda k: each[k])
         assert obstacle[row, column] == best
         assert distance[row, column] == pytest.approx(each[best], abs=1e-14)
+
+
+BOX = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)]
+
+
+def test_every_shape_has_its_surface(tmp_path: Path) -> None:
+    run = Run(ticks=12)
+    m = obstacles(SOURCE, 1, 2, [(k, (k, 0.0, 0.0), 0.0) for k in range(1, 5)])
+    m.o[0].shape, m.o[0].radius = m.o[0].SPHERE, 0.25
+    m.o[1].shape, m.o[1].radius, m.o[1].size = m.o[1].CAPSULE, 0.125, [0.5, 0, 0]
+    m.o[2].shape, m.o[2].size = m.o[2].BOX, [0.1, 0.2, 0.3]
+    m.o[3].shape, m.o[3].p = m.o[3].HALFSPACE, [0, 0, -1]
+    run.inserted[3] = [("HULL", hull(SOURCE, 1, 9, (0.0, 2.0, 0.0), BOX))]
+    run.inserted[6] = [("OBSTACLES", m)]
+    run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, []))
+    see(run, slice(3, 6), SOURCE, 1, hull=True)
+    see(run, slice(6, None), SOURCE, 1)
+    log = read_log(run.write(tmp_path))
+    points = np.tile(
+        [[0.5, 0, 0], [2, 0, 1], [3, 0, 0.5], [0, 0, -0.75], [0, 1.5, 0], [9, 9, 9]], (12, 1, 1)
+    )
+    around = follow(log, log.commands, points)
+    assert np.isnan(around.distance[:3]).all()
+    assert around.obstacle[3:6].tolist() == [[9] * 6] * 3
+    assert around.distance[4, 4] == pytest.approx(0.3)
+    assert around.obstacle[8].tolist() == [1, 2, 3, 4, 4, 4]  # a REPLACE dropped the hull
+    assert around.distance[8, :4].tolist() == pytest.approx([0.25, 0.375, 0.2, 0.25])
+    a = analysed(run, tmp_path)
+    found = " ".join(texts(a, "obstacle"))
+    for text in (
+        "hull of 8 vertices at (0, 2, 0) m",
+        "capsule of radius 0.125 m and half length 0.5 m at (2, 0, 0) m",
+        "box of half extents 0.1, 0.2, 0.3 m at (3, 0, 0) m",
+        "plane through (0, 0, -1) m",
+        "sphere of radius 0.25 m",
+        "obstacle 9 removed",
+    ):
+        assert text in found
+
+
+def test_a_moving_obstacle_is_where_it_was_at_the_tick(tmp_path: Path) -> None:
+    run = Run(ticks=41)
+    m = obstacles(SOURCE, 1, 2, [(7, (2.0, 0.0, 0.0), 0.25)])
+    m.o[0].v, m.time_ns, m.valid_for_ms = [0.0, 0.0, 1.0], 10 * PERIOD_NS, 160
+    run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, []))
+    run.inserted[10] = [("OBSTACLES", m)]
+    see(run, slice(10, None), SOURCE, 1)
+    log = read_log(run.write(tmp_path))
+    around = follow(log, log.commands, np.zeros((41, 6, 3)))
+    z = (np.arange(10, 30) - 10) * PERIOD
+    assert around.distance[10:30, 0] == pytest.approx(np.hypot(2, z) - 0.25)
+    assert np.isnan(around.distance[30:]).all()  # it has expired
 
 
 def test_no_obstacle_means_no_distance(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ from log_maker import PERIOD_NS, SOURCE, Run, analysed, obstacles, see, stamp, t
 import leeway
 from leeway.logs import solids
 from leeway.logs.log import Floats, read_log
-from leeway.logs.solids import Obstacle, distances_to, is_usable
-from leeway.logs.world import HULL, follow
+from leeway.logs.solids import Obstacle
+from leeway.logs.world import follow
 from leeway.report.solids import faces, polygon_in
 
 CORNERS = ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.4, 0.0), (0.1, 0.0, 0.5))
@@ -50,19 +50,6 @@ def native(o: Obstacle) -> tuple[leeway.Shape, Floats]:
     return shapes[o.shape](), pose
 
 
-@pytest.mark.parametrize("shape", range(5))
-def test_distances_are_those_of_the_c_code(shape: int) -> None:
-    random = np.random.default_rng(shape)
-    for _ in range(20):
-        o = make(shape, random)
-        assert is_usable(o)
-        points = random.uniform(-1.5, 1.5, (40, 3))
-        poses = np.broadcast_to(np.eye(4), (40, 4, 4)).copy()
-        poses[:, :3, 3] = points
-        expected = leeway.distance(leeway.Sphere(0), poses, *native(o)).distance
-        np.testing.assert_allclose(distances_to(points, (o,))[:, 0], expected, atol=1e-9)
-
-
 @pytest.mark.parametrize("shape", range(4))
 def test_surfaces_lie_on_the_solid(shape: int) -> None:
     random = np.random.default_rng(shape)
@@ -70,7 +57,10 @@ def test_surfaces_lie_on_the_solid(shape: int) -> None:
         o = make(shape, random)
         o = Obstacle(**vars(o) | {"radius": 0.0}) if shape in (solids.BOX, solids.HULL) else o
         points = np.vstack(faces(o.core, o.radius))
-        np.testing.assert_allclose(distances_to(points, (o,)), 0, atol=1e-9)
+        poses = np.broadcast_to(np.eye(4), (len(points), 4, 4)).copy()
+        poses[:, :3, 3] = points
+        away = leeway.distance(leeway.Sphere(0), poses, *native(o)).distance
+        np.testing.assert_allclose(away, 0, atol=1e-9)
 
 
 def test_a_box_has_six_faces_and_its_rounding_is_added() -> None:
@@ -127,13 +117,11 @@ def test_a_hull_is_moved_by_its_name(tmp_path: Path) -> None:
         4: [("HULL", hull_message(1))],
         6: [("OBSTACLES", moved(2, 0.7))],
     }
-    for command in run.commands[4:]:
-        command.world_channel = HULL
-    see(run, slice(4, 12), SOURCE, 1)
+    see(run, slice(4, 12), SOURCE, 1, hull=True)
     for command in run.commands[7:]:
         command.world_channel, command.world_seq = command.OBSTACLES, 2
     log = read_log(run.write(tmp_path))
-    line = follow(log.obstacles, log.hulls, log.commands)
+    line = follow(log, log.commands, np.zeros((len(log.commands), 6, 3))).line
     found = [{o.id: o for o in line.worlds[i]} for i in line.index]
     assert line.unknown_ticks == 0
     assert 5 not in found[3]
@@ -150,6 +138,6 @@ def test_what_expires_is_gone(tmp_path: Path) -> None:
     run.inserted[2] = [("OBSTACLES", message)]
     see(run, slice(3, 12), SOURCE, 1)
     log = read_log(run.write(tmp_path))
-    line = follow(log.obstacles, log.hulls, log.commands)
+    line = follow(log, log.commands, np.zeros((len(log.commands), 6, 3))).line
     there = [any(o.id == 7 for o in line.worlds[i]) for i in line.index]
     assert np.flatnonzero(there).tolist() == [3, 4, 5]

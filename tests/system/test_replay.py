@@ -177,7 +177,7 @@ def test_a_post_mortem_log_is_equal_but_for_its_first_tick(root: Path, tmp_path:
     (log,) = folder.glob("*.lcm")
     status, found = verify(log)
     (c,) = found["controllers"]
-    # The log begins in mid-run: its first tick, and whether the tip was stuck before it, are not known.
+    # The log begins in mid-run: of its first tick and of being stuck before nothing is known.
     forgotten = c["unknown"].pop("what it remembered is older than the log", 0)
     assert (status, c["differing"], list(c["unknown"].values())) == (3, 0, [1])
     assert c["verified"] + forgotten == ticks_in(log) - 1 > 200

@@ -8,9 +8,15 @@
 // Errors   see world.hpp.
 #include "world.hpp"
 
+#include <algorithm>  // copy
+#include <cmath>      // INFINITY
 #include <new>        // bad_alloc
 #include <stdexcept>  // invalid_argument
 #include <sys/mman.h> // mmap
+
+extern "C" {
+#include "collision/near.h" // lw_near_each
+}
 
 namespace nb = nanobind;
 
@@ -77,6 +83,34 @@ void World::adopt(int channel, int64_t session, int64_t seq, int64_t version)
     seen_.reset();
 }
 
+nb::tuple World::nearest(const Input &points, const nb::ndarray<const int64_t, nb::c_contig> &times) const
+{
+    if (points.ndim() != 3 || points.shape(2) != 3 || points.shape(1) > LW_BODY_MAX || times.size() != points.shape(0))
+        throw std::invalid_argument("points: expected (n, k, 3) with k up to 12, and n times");
+    const size_t parts = points.shape(1);
+    Owned<double> distance({points.shape(0), parts});
+    Owned<int64_t> obstacle({points.shape(0), parts});
+    lw_body body = {};
+    lw_placed placed = {};
+    lw_near near[LW_BODY_MAX];
+    body.count = static_cast<int>(parts);
+    body.tool_part = -1;
+    for (size_t row = 0; row < points.shape(0); row++) {
+        for (size_t part = 0; part < parts; part++) {
+            const double *point = points.data() + 3 * (row * parts + part);
+            std::copy(point, point + 3, placed.capsule[part].a);
+            std::copy(point, point + 3, placed.capsule[part].b);
+        }
+        const lw_near_query query = {&body, &placed, &look(), times.data()[row], INFINITY, nullptr};
+        lw_near_each(&query, near);
+        for (size_t part = 0; part < parts; part++) {
+            distance.data[row * parts + part] = near[part].distance.d;
+            obstacle.data[row * parts + part] = near[part].obstacle;
+        }
+    }
+    return nb::make_tuple(distance.release(), obstacle.release());
+}
+
 nb::list World::obstacles() const
 {
     nb::list out;
@@ -87,7 +121,7 @@ nb::list World::obstacles() const
         const int vertices = lw_world_vertices(data_.get(), &entry, vertex);
         out.append(nb::make_tuple(o.id, static_cast<int>(o.shape), numbers(o.p, 3), numbers(o.quat, 4), o.radius,
                                   numbers(o.size, 3), numbers(o.v, 3), numbers(o.omega, 3), entry.time_ns,
-                                  data_->expires_ns[at], numbers(vertex, 3 * vertices)));
+                                  data_->expires_ns[at], numbers(vertex, 3 * vertices), data_->owner[at]));
     }
     return out;
 }
@@ -113,7 +147,10 @@ void bind_world(nb::module_ &m)
         .def("adopt", &World::adopt, nb::arg("channel"), nb::arg("session"), nb::arg("seq"), nb::arg("version"),
              "Takes the echo of a command for a world whose history is not known.")
         .def("obstacles", &World::obstacles,
-             "Each as (id, shape, p m, quat, radius m, size m, v m/s, omega rad/s, time_ns, expires_ns, vertices m).")
+             "Each as (id, shape, p m, quat, radius m, size m, v m/s, omega rad/s, time_ns, expires_ns, vertices m, "
+             "owner).")
+        .def("nearest", &World::nearest, nb::arg("points"), nb::arg("times"),
+             "Distance (n, k) m of points (n, k, 3) m to the nearest surface at times (n,) ns, and whose it is (n, k).")
         .def_prop_ro("echo", &World::echo, "Channel, session and seq of the newest message, number of changes.")
         .def_prop_ro(
             "count", [](const World &w) { return w.data().count; }, "Number of obstacles.")

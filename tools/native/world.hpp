@@ -9,6 +9,8 @@
 #ifndef LEEWAY_NATIVE_WORLD_HPP
 #define LEEWAY_NATIVE_WORLD_HPP
 
+#include "arrays.hpp" // Input
+
 #include <nanobind/nanobind.h>
 
 #include <memory> // shared_ptr
@@ -41,6 +43,12 @@ class World
 
     // Every obstacle as a tuple of its values, in the order of its digest.
     nanobind::list obstacles() const;
+
+    // Distance (m) of each point to the nearest surface at a time, and whose it is; infinite and 0 = no obstacle.
+    //   points  (n, k, 3) m, k up to 12
+    //   times   (n,) ns
+    nanobind::tuple nearest(const Input &points,
+                            const nanobind::ndarray<const int64_t, nanobind::c_contig> &times) const;
 
     // The world as the tick sees it.
     const lw_snapshot &look() const;

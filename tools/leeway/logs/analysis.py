@@ -21,7 +21,7 @@ from leeway.logs.limits import LimitUse, limit_uses
 from leeway.logs.log import Commands, Floats, Ints, Log, LogError, SceneMessage
 from leeway.logs.motion import select_motion
 from leeway.logs.programs import Program, list_programs
-from leeway.logs.world import WorldLine, follow, nearest
+from leeway.logs.world import WorldLine, follow
 
 FLAGS = {
     "position": 1,
@@ -214,8 +214,8 @@ def analyse(log: Log) -> Analysis:
     if not np.isfinite(points).any():
         raise LogError(f"{log.path}: no joint position in its commands is a number")
     goal = _goal_in_force(commands, scene["request"]["goal"])
-    line = follow(log.obstacles, log.hulls, commands)
-    distances, obstacle = nearest(points, line)
+    around = follow(log, commands, points)
+    line, distances, obstacle = around.line, around.distance, around.obstacle
     uses = limit_uses(scene, motion)
     lockstep = scene_message.mode == "lockstep"
     stem = Path(scene_message.file).stem

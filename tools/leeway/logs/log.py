@@ -106,6 +106,7 @@ class Log:
     stops: Stops
     worlds: Obstacles  # WORLD: the obstacles as the controller tells them
     world_hulls: Hulls  # WORLD_HULL
+    told: dict[str, Table]  # OBSTACLES and HULL as they are on the wire
     statuses: Statuses  # of controllers
     plant_statuses: Statuses  # of simulators
 
@@ -152,6 +153,7 @@ def read_log(path: str | os.PathLike[str], name: str | None = None) -> Log:
         stops=_columns(by_name["STOP"], Stops),
         worlds=_columns(by_name["WORLD"], Obstacles),
         world_hulls=_columns(by_name["WORLD_HULL"], Hulls),
+        told={name: by_name[name] for name in SHARED},
         statuses=_columns(by_name["STATUS"], Statuses),
         plant_statuses=_columns(by_name["PLANT_STATUS"], Statuses),
     )

@@ -1,22 +1,18 @@
-"""Obstacles of a log: what they are, and the distance of points to them.
+"""Obstacles of a log: what they are.
 
 Units are metres and rad, positions in the base frame of the arm, quaternions w x y z.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from leeway.logs.log import Floats, Ints
-from leeway.shapes import Hull, Sphere, distance
+from leeway.logs.log import Floats
 
 SPHERE, CAPSULE, BOX, HULL, HALFSPACE = range(5)  # obstacle_t
 NAMES = ("sphere", "capsule", "box", "hull", "plane")
-VALUE_MAX = 100.0  # m, m/s, rad/s
-UNIT_SLACK = 1e-3
 TURNED = (1.0, 0.0, 0.0, 0.0)
 
 Triple = tuple[float, float, float]
@@ -82,59 +78,3 @@ class Obstacle:
         else:
             size = "plane through"
         return f"{size} at ({place}) m" if self.shape != HALFSPACE else f"{size} ({place}) m"
-
-
-def is_usable(obstacle: Obstacle) -> bool:
-    """Whether a program takes an obstacle: as lw_obstacle_check."""
-    used = {CAPSULE: 1, BOX: 3}.get(obstacle.shape, 0)
-    sizes = obstacle.size[:used]
-    values = (*obstacle.p, *obstacle.v, *obstacle.omega, *sizes, obstacle.radius)
-    values += tuple(v for vertex in obstacle.vertices for v in vertex)
-    if not all(math.isfinite(v) and abs(v) <= VALUE_MAX for v in (*values, *obstacle.quat)):
-        return False
-    length = math.sqrt(sum(q * q for q in obstacle.quat))
-    sizes_fit = all(v > 0 for v in sizes) if obstacle.shape == BOX else all(v >= 0 for v in sizes)
-    known = SPHERE <= obstacle.shape <= HALFSPACE
-    return known and abs(length - 1) <= UNIT_SLACK and sizes_fit and obstacle.radius >= 0
-
-
-def distances_to(points: Floats, obstacles: tuple[Obstacle, ...]) -> Floats:
-    """Distance of points (..., 3) to the surface of each obstacle, (..., n) m; negative inside."""
-    flat = points.reshape(-1, 3)
-    out = np.empty((len(flat), len(obstacles)))
-    shapes: Ints = np.array([o.shape for o in obstacles])
-    spheres = np.flatnonzero(shapes == SPHERE)
-    if len(spheres):
-        centres = np.array([obstacles[i].p for i in spheres])
-        radii = np.array([obstacles[i].radius for i in spheres])
-        out[:, spheres] = np.linalg.norm(flat[:, None] - centres, axis=-1) - radii
-    for i in np.flatnonzero(shapes != SPHERE):
-        out[:, i] = _distance_to(flat, obstacles[i])
-    return out.reshape(*points.shape[:-1], len(obstacles))
-
-
-def _distance_to(points: Floats, o: Obstacle) -> Floats:
-    """Return the distances of points (n, 3) to an obstacle that is no sphere, (n,)."""
-    if o.shape == HULL:
-        return _distance_to_hull(points, o)
-    local = (points - o.p) @ o.rotation
-    if o.shape == HALFSPACE:
-        return np.asarray(local[:, 2])
-    if o.shape == CAPSULE:
-        local[:, 2] -= np.clip(local[:, 2], -o.size[0], o.size[0])
-        return np.asarray(np.linalg.norm(local, axis=1) - o.radius)
-    beyond = np.abs(local) - o.size
-    outside = np.linalg.norm(np.maximum(beyond, 0), axis=1)
-    return np.asarray(outside + np.minimum(beyond.max(axis=1), 0) - o.radius)
-
-
-def _distance_to_hull(points: Floats, o: Obstacle) -> Floats:
-    poses = np.broadcast_to(np.eye(4), (len(points), 4, 4)).copy()
-    poses[:, :3, 3] = points
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = o.rotation, o.p
-    out = np.full(len(points), np.nan)
-    known = np.isfinite(points).all(axis=1)
-    if known.any():
-        out[known] = distance(Sphere(0), poses[known], Hull(o.vertices, o.radius), pose).distance
-    return out

@@ -123,7 +123,7 @@ def _as_float(bits: int) -> float:
 
 def obstacle_words(obstacle: Any) -> tuple[list[Word], list[Word]]:
     """Return the values of an obstacle of `World.obstacles`, and those of its vertices."""
-    number, shape, p, quat, radius, size, v, omega, time_ns, expires_ns, vertices = obstacle
+    number, shape, p, quat, radius, size, v, omega, time_ns, expires_ns, vertices, _ = obstacle
     what = f"OBSTACLES id {number}"
     points = floats(f"HULL id {number}: vertex", vertices)
     corners = [integer(f"HULL id {number}: number of vertices", len(vertices) // 3), *points]
