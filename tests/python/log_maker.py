@@ -21,7 +21,7 @@ robot: ur5
 rate_hz: 125
 duration_s: 0.4
 q0: [0, 0, 0, 0, 0, 0]
-law: {attraction: cone, rho_rep: 1.9}
+law: {control_points: joints, attraction: cone, rho_rep: 1.9}
 request: {goal: [0.5, -0.6, 0.5]}
 obstacles:
   - {at: [1, 1, 0.4]}

@@ -21,6 +21,7 @@ DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 UPSERT, REMOVE, CLEAR = wire.obstacles_t.UPSERT, wire.obstacles_t.REMOVE, wire.obstacles_t.CLEAR
 SHARED = ("OBSTACLES", "HULL")  # by all robots of a bus
 RECEIVE_BUFFER = 2 << 20
+OWNER = slice(40, 48)  # of obstacles_t and hull_t, behind fingerprint and header
 REPEAT_S = 0.1
 PATIENCE_S = 2.0
 
@@ -172,6 +173,31 @@ def send_goal(bus: Connection, robot: str | None, goal: tuple[float, float, floa
     )
 
 
+def send_change(bus: Connection, robot: str | None, message: Any) -> Any:
+    """Send an obstacles_t or hull_t, stamped here, as `send_until_echoed` does.
+
+    Where many send, a command names another one's message each time: then it counts that the
+    controller tells the obstacles as this sender's.
+    """
+    session = new_session()
+    message.h = header(session, 1)
+    known: list[int] = []
+
+    def on_world(_: str, data: bytes) -> None:
+        if data[OWNER] == session.to_bytes(8, "big"):
+            known.append(session)
+
+    for name in ("WORLD", "WORLD_HULL"):
+        bus.subscribe(channel(name, robot), on_world)
+    return send_until_echoed(
+        bus,
+        "HULL" if isinstance(message, wire.hull_t) else "OBSTACLES",
+        message,
+        channel("JOINT_COMMAND", robot),
+        lambda command: command.world_session == session or bool(known),
+    )
+
+
 def send_obstacles(
     bus: Connection,
     robot: str | None,
@@ -179,16 +205,8 @@ def send_obstacles(
     entries: list[tuple[int, tuple[float, float, float], float]],
 ) -> Any:
     """Send a change of obstacles (id, centre m, radius m), as `send_until_echoed` does."""
-    session = new_session()
     message = wire.obstacles_t()
-    message.h = header(session, 1)
     message.op, message.n = op, len(entries)
     for slot, (number, centre, radius) in zip(message.o, entries, strict=False):
         slot.id, slot.p, slot.quat, slot.radius = number, list(centre), [1.0, 0.0, 0.0, 0.0], radius
-    return send_until_echoed(
-        bus,
-        "OBSTACLES",
-        message,
-        channel("JOINT_COMMAND", robot),
-        lambda command: command.world_session == session,
-    )
+    return send_change(bus, robot, message)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from leeway import cli_machine, cli_replay
+from leeway import cli_machine, cli_obstacle, cli_replay
 from leeway.options import EXIT_INTERRUPTED, EXIT_LOSS, EXIT_USAGE, Common, command, fail
 
 if TYPE_CHECKING:
@@ -25,10 +25,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-obstacle_app = typer.Typer(
-    help="Put obstacles on the bus, as a sensor would.", no_args_is_help=True
-)
-app.add_typer(obstacle_app, name="obstacle")
 cli_machine.register(app)
 
 SceneArg = Annotated[
@@ -40,9 +36,6 @@ SetOption = Annotated[
     typer.Option(
         "--set", "-s", metavar="KEY=VALUE", help="Replace a key of the scene. Repeatable."
     ),
-]
-AtOption = Annotated[
-    tuple[float, float, float], typer.Option("--at", metavar="X Y Z", help="Centre, m, base frame.")
 ]
 
 
@@ -306,78 +299,7 @@ def _check_point(point: tuple[float, float, float]) -> None:
         fail(f"expected three numbers from -100 to 100 (m), found {point}", EXIT_USAGE)
 
 
-def _put(entry: tuple[int, tuple[float, float, float], float], verb: str, common: Common) -> None:
-    """Check and send one obstacle."""
-    from leeway import bus
-
-    number, at, radius = entry
-    _check_point(at)
-    if not (0 < number < 1 << 31) or not 0 <= radius <= 100:
-        fail(
-            f"expected an id > 0 and a radius from 0 to 100 (m), found {number} and {radius:g}",
-            EXIT_USAGE,
-        )
-    what = f"obstacle {number} {verb} {at[0]:g} {at[1]:g} {at[2]:g}" + (
-        f", radius {radius:g}" if radius else ""
-    )
-    _send(what, lambda b: bus.send_obstacles(b, common.name, bus.UPSERT, [entry]), common)
-
-
-@command(obstacle_app, "add", "leeway obstacle add --at 0.4 -0.5 0.3 --radius 0.1")
-def obstacle_add(
-    at: AtOption,
-    radius: Annotated[float, typer.Option(help="m; 0 is a point.")] = 0.0,
-    number: Annotated[
-        int | None, typer.Option("--id", help="Default: a free number is drawn.")
-    ] = None,
-    *,
-    common: Common,
-) -> None:
-    """Add a point or a sphere."""
-    import secrets
-
-    chosen = number if number is not None else 1000 + secrets.randbelow(1_000_000)
-    _put((chosen, at, radius), "at", common)
-
-
-@command(obstacle_app, "move", "leeway obstacle move 7 --at 0.5 -0.5 0.3")
-def obstacle_move(
-    number: Annotated[int, typer.Argument(metavar="ID")],
-    at: AtOption,
-    radius: Annotated[float, typer.Option(help="m; 0 is a point.")] = 0.0,
-    *,
-    common: Common,
-) -> None:
-    """Put an obstacle elsewhere."""
-    _put((number, at, radius), "to", common)
-
-
-@command(obstacle_app, "remove", "leeway obstacle remove 7")
-def obstacle_remove(
-    number: Annotated[int, typer.Argument(metavar="ID", min=1, max=(1 << 31) - 1)],
-    *,
-    common: Common,
-) -> None:
-    """Remove an obstacle. One that a sensor still reports comes back with its next message."""
-    from leeway import bus
-
-    entry = (number, (0.0, 0.0, 0.0), 0.0)
-    _send(
-        f"obstacle {number} removed",
-        lambda b: bus.send_obstacles(b, common.name, bus.REMOVE, [entry]),
-        common,
-    )
-
-
-@command(obstacle_app, "clear", "leeway obstacle clear")
-def obstacle_clear(*, common: Common) -> None:
-    """Remove all obstacles of all senders. Those that a running sensor reports come back."""
-    from leeway import bus
-
-    _send(
-        "all obstacles removed", lambda b: bus.send_obstacles(b, common.name, bus.CLEAR, []), common
-    )
-
+cli_obstacle.register(app, _send)
 
 # --- demo and bench ---
 

@@ -255,7 +255,7 @@ def analyse(log: Log) -> Analysis:
         plant_qdd=motion.plant_qdd,
         limits=uses,
         smallest=_smallest(motion.t, distances, obstacle),
-        distance_check=_compare(distances, commands.clearance),
+        distance_check=_compare(distances, commands.clearance, scene["law"]["control_points"]),
         late_ticks=0 if lockstep else int(commands.skipped[-1] - commands.skipped[0]),
         losses=motion.losses | {"worlds_unknown": line.unknown_ticks},
         post_mortem=motion.post_mortem,
@@ -318,13 +318,16 @@ def _smallest(t: Floats, distances: Floats, obstacle: Ints) -> Nearest:
     return Nearest(float(moving[row, column]), point, int(obstacle[row, point - 1]), float(t[row]))
 
 
-def _compare(distances: Floats, reported: Floats) -> float:
-    """Return the largest difference to the controller's own smallest distance, m; NaN = none."""
+def _compare(distances: Floats, reported: Floats, control_points: str) -> float:
+    """Return the largest difference to the controller's own smallest distance, m; NaN = none.
+
+    A controller that looks at the whole arm is nearer than the origins of the frames.
+    """
     moving = distances[:, MOVING_POINTS]
-    both = np.isfinite(moving).all(axis=1) & (reported != -1)
-    return (
-        float(np.abs(moving[both].min(axis=1) - reported[both]).max()) if both.any() else math.nan
-    )
+    both = np.isfinite(moving).all(axis=1) & np.isfinite(reported)
+    if control_points != "joints" or not both.any():
+        return math.nan
+    return float(np.abs(moving[both].min(axis=1) - reported[both]).max())
 
 
 def _largest(values: Floats) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from leeway.logs.log import Floats
 
 SPHERE, CAPSULE, BOX, HULL, HALFSPACE = range(5)  # obstacle_t
-NAMES = ("sphere", "capsule", "box", "hull", "plane")
+NAMES = ("sphere", "capsule", "box", "hull", "plane")  # by obstacle_t.shape
 TURNED = (1.0, 0.0, 0.0, 0.0)
 
 Triple = tuple[float, float, float]
@@ -32,6 +32,7 @@ class Obstacle:
     v: Triple = (0.0, 0.0, 0.0)
     omega: Triple = (0.0, 0.0, 0.0)
     vertices: tuple[Triple, ...] = ()
+    time_ns: int = field(default=0, compare=False)  # when it was there, 0 = not told
     expires_ns: int = field(default=0, compare=False)  # 0 = never
 
     @property

@@ -94,10 +94,21 @@ def _not_expired(world: World, rows: Ints, tick_ns: Ints) -> Iterator[tuple[Ints
 
 def _obstacle(values: tuple[Any, ...]) -> Obstacle:
     """Return an obstacle of the controller's world."""
-    number, shape, p, quat, radius, size, v, omega, _, expires_ns, vertices, owner = values
+    number, shape, p, quat, radius, size, v, omega, time_ns, expires_ns, vertices, owner = values
     corners = tuple(zip(*[iter(vertices)] * 3, strict=True))
     return Obstacle(
-        number, tuple(p), radius, owner, shape, quat, tuple(size), v, omega, corners, expires_ns
+        id=number,
+        p=tuple(p),
+        radius=radius,
+        session=owner,
+        shape=shape,
+        quat=quat,
+        size=tuple(size),
+        v=v,
+        omega=omega,
+        vertices=corners,
+        time_ns=time_ns,
+        expires_ns=expires_ns,
     )
 
 
