@@ -143,9 +143,8 @@ def register(app: typer.Typer, send: Send) -> None:
 # --- words to obstacles ---
 
 
-def _draft(number: int, shape: Kind, at: Triple, size: Size, motion: Motion) -> "Draft":
-    from leeway.obstacles import Draft, Refused, from_normal, vertices
-
+def _check_options(shape: Kind, size: Size, motion: Motion) -> None:
+    """Fail where options do not fit the shape or one another."""
     given = {name for name, value in vars(size).items() if value is not None}
     unfit = sorted(given - OPTIONS[shape])
     if unfit:
@@ -155,6 +154,12 @@ def _draft(number: int, shape: Kind, at: Triple, size: Size, motion: Motion) -> 
             fail(f"a {shape.value} needs --{name}", EXIT_USAGE)
     if motion.rpy is not None and size.normal is not None:
         fail("--normal or --rpy, not both", EXIT_USAGE)
+
+
+def _draft(number: int, shape: Kind, at: Triple, size: Size, motion: Motion) -> "Draft":
+    from leeway.obstacles import Draft, Refused, from_normal, vertices
+
+    _check_options(shape, size, motion)
     try:
         draft = Draft(number, list(Kind).index(shape), at, radius=size.radius or 0.0)
         if size.size is not None:
@@ -214,7 +219,8 @@ def _moved(
 def _tell(draft: "Draft", verb: str, send: Send, common: Common) -> None:
     """Check an obstacle and send it."""
     from leeway import bus
-    from leeway.obstacles import NAMES, Refused, clock_ns
+    from leeway.logs.solids import NAMES
+    from leeway.obstacles import Refused, clock_ns
 
     def say(own: Any) -> Any:
         now = clock_ns(own, common.name) if draft.is_timed else 0
