@@ -63,7 +63,11 @@ def vertices(text: str) -> list[Vector]:
     Refused
         They are no points, or not 1 to 64.
     """
-    if Path(text).is_file():
+    try:
+        is_file = Path(text).is_file()
+    except OSError:  # too long for a name
+        is_file = False
+    if is_file:
         lines = [line.partition("#")[0] for line in Path(text).read_text().splitlines()]
         points = [line.replace(",", " ").split() for line in lines if line.strip()]
     else:
