@@ -17,7 +17,7 @@
 #include "base/periodic.h" // lw_periodic_*
 #include "base/stop.h"     // lw_stop_signal
 
-#include <math.h>      // INFINITY
+#include <math.h>      // HUGE_VAL
 #include <stdatomic.h> // atomic_bool
 #include <stdlib.h>    // EXIT_FAILURE
 
@@ -265,7 +265,7 @@ static void report(struct live *live, enum lw_plant_mode *before)
     if (newest == NULL)
         return;
     say_mode(live, &newest->state, before);
-    struct lw_report report = {.state = run_state(live, newest), .clearance = (double)INFINITY, .world_age_ns = -1};
+    struct lw_report report = {.state = run_state(live, newest), .clearance = HUGE_VAL, .world_age_ns = -1};
     lw_program_report(live->simulation->program, live->main_bus, &live->health, &report);
 }
 

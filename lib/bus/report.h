@@ -41,7 +41,7 @@ struct lw_report {
     double clearance;       // m, infinite = no obstacle
     double deviation;       // m
     int64_t stuck_since_ns; // 0 = not stuck
-    int obstacle_count;
+    int64_t obstacle_count;
     int64_t world_age_ns; // -1 = nothing heard of obstacles
 };
 

@@ -33,7 +33,7 @@ static int encode_status(void *data, const union lw_message *message)
                          .clearance = r->clearance,
                          .deviation = r->deviation,
                          .stuck_since_ns = r->stuck_since_ns,
-                         .obstacle_count = r->obstacle_count,
+                         .obstacle_count = (int32_t)r->obstacle_count,
                          .world_age_ns = r->world_age_ns};
     memcpy(w.refused, r->refused, sizeof r->refused);
     memcpy(w.wake_late_ns, r->wake_late_ns, sizeof w.wake_late_ns);

@@ -153,7 +153,8 @@ static struct lw_body_hull hull_of(const struct lw_tool *tool)
     static const struct lw_pose flange = {.r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     const struct lw_solid solid = {
         .kind = LW_HULL, .radius = tool->radius, .count = tool->count, .vertex = tool->vertex};
-    struct lw_body_hull hull = {.count = 1, .padded = 4, .centre = {NAN, NAN, NAN}, .reach = NAN};
+    struct lw_body_hull hull = {
+        .count = 1, .padded = 4, .centre = {(double)NAN, (double)NAN, (double)NAN}, .reach = (double)NAN};
     struct lw_shape shape;
     if (lw_shape_make(&solid, &flange, hull.vertex, &shape, NULL) != LW_OK)
         return hull; // it was not checked: its distances are no numbers

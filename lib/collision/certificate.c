@@ -11,12 +11,12 @@
 #include "collision/custom.h"   // lw_custom_reach
 #include "collision/distance.h" // lw_distance_gap
 
-#include <math.h> // fabs, INFINITY
+#include <math.h> // fabs, HUGE_VAL
 
 // Largest n . (x - origin) over the core of a shape.
 static double reach(const struct lw_shape *shape, const double n[3], const double origin[3])
 {
-    double from[3], most = -INFINITY;
+    double from[3], most = -HUGE_VAL;
     lw_vec_sub(shape->c, origin, from);
     const double centre = lw_vec_dot(n, from);
     switch (shape->kind) {
@@ -43,7 +43,7 @@ static double reach(const struct lw_shape *shape, const double n[3], const doubl
         return centre + most;
     case LW_HALFSPACE: // bounded in one direction alone
         if (n[0] != shape->halfspace.m[0] || n[1] != shape->halfspace.m[1] || n[2] != shape->halfspace.m[2])
-            return INFINITY;
+            return HUGE_VAL;
         return shape->halfspace.o - lw_vec_dot(n, origin);
     default: return lw_custom_reach(shape, n, origin);
     }
@@ -54,7 +54,7 @@ double lw_distance_shapes_gap(const struct lw_shape *a, const struct lw_shape *b
     if (result->flags & LW_DISTANCE_FAR)
         return 0;
     if (result->flags & LW_DISTANCE_NO_NORMAL)
-        return INFINITY;
+        return HUGE_VAL;
     const double *n = result->n;
     const double *origin = a->kind == LW_HALFSPACE ? a->c : b->c;
     const double back[3] = {-n[0], -n[1], -n[2]};

@@ -8,7 +8,7 @@
 // Errors   none.
 #include "collision/closed.h"
 
-#include <math.h>    // sqrt, fabs, INFINITY, NAN
+#include <math.h>    // sqrt, fabs, HUGE_VAL, NAN
 #include <stdbool.h> // bool
 #include <string.h>  // memcpy
 

@@ -11,7 +11,7 @@
 #include "base/vec.h"         // lw_vec_*
 #include "collision/closed.h" // lw_closed_apart, lw_closed_core
 
-#include <math.h> // sqrt, INFINITY
+#include <math.h> // sqrt, HUGE_VAL
 
 // How far apart overlapping cores are moved to find the witness points.
 static const double clearance = 0.01;
@@ -30,7 +30,7 @@ static double reach(const struct lw_cloud *cloud)
 
 struct lw_gjk_query lw_clouds_query(struct lw_cloud a, struct lw_cloud b)
 {
-    return (struct lw_gjk_query){.a = a, .b = b, .size = reach(&a) + reach(&b), .far = INFINITY, .cap = LW_GJK_CAP};
+    return (struct lw_gjk_query){.a = a, .b = b, .size = reach(&a) + reach(&b), .far = HUGE_VAL, .cap = LW_GJK_CAP};
 }
 
 // Point i of a core relative to the shape's centre.

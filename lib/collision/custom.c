@@ -14,7 +14,7 @@
 #include "collision/clouds.h"  // lw_clouds_of
 #include "collision/simplex.h" // lw_simplex_reduce
 
-#include <math.h>    // sqrt, isfinite, INFINITY, NAN
+#include <math.h>    // sqrt, isfinite, HUGE_VAL, NAN
 #include <stdbool.h> // bool
 #include <string.h>  // memcpy
 
@@ -106,8 +106,8 @@ static int nearest(struct search *g, const double start[3], double far, int *ite
     s->count = 0;
     (void)add_support(g, start); // an empty simplex has nothing yet
     s->count = 1;
-    if (!lw_simplex_reduce(s, INFINITY)) {
-        s->v[0] = s->v[1] = s->v[2] = NAN;
+    if (!lw_simplex_reduce(s, HUGE_VAL)) {
+        s->v[0] = s->v[1] = s->v[2] = (double)NAN;
         return LW_DISTANCE_STALLED;
     }
     for (*iterations = 1; *iterations < CAP;) {

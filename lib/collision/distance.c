@@ -13,7 +13,7 @@
 #include "collision/clouds.h" // lw_clouds_*
 #include "collision/custom.h" // lw_custom_distance
 
-#include <math.h>    // sqrt, INFINITY
+#include <math.h>    // sqrt, HUGE_VAL
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
 
@@ -154,10 +154,10 @@ enum lw_status lw_distance_shapes(const struct lw_shape *a, const struct lw_shap
         return LW_E_ARGUMENT;
     if (is_segment(a)) {
         const struct lw_capsule capsule = lw_shape_capsule(a);
-        lw_distance_link(&capsule, b, INFINITY, NULL, out);
+        lw_distance_link(&capsule, b, HUGE_VAL, NULL, out);
     } else if (is_segment(b)) {
         const struct lw_capsule capsule = lw_shape_capsule(b);
-        lw_distance_link(&capsule, a, INFINITY, NULL, out);
+        lw_distance_link(&capsule, a, HUGE_VAL, NULL, out);
         flip(out);
     } else if (b->kind == LW_HALFSPACE) {
         cloud_to_halfspace(a, b, out);
@@ -165,7 +165,7 @@ enum lw_status lw_distance_shapes(const struct lw_shape *a, const struct lw_shap
         cloud_to_halfspace(b, a, out);
         flip(out);
     } else if (custom) {
-        lw_custom_distance(a, b, INFINITY, out);
+        lw_custom_distance(a, b, HUGE_VAL, out);
     } else {
         clouds(a, b, out);
     }

@@ -42,7 +42,7 @@ struct lw_warm {
 };
 
 // Distance of a link to a shape.
-//   d_max  in   m: beyond it any proven lower bound will do (FAR); INFINITY = always exact
+//   d_max  in   m: beyond it any proven lower bound will do (FAR); HUGE_VAL = always exact
 //   warm   i/o  may be NULL; read and written for hulls alone
 // Cost: closed forms at most 8 steps, hulls at most 48 supports, overlapping hulls 92 more.
 void lw_distance_link(const struct lw_capsule *link, const struct lw_shape *shape, double d_max, struct lw_warm *warm,
@@ -58,7 +58,7 @@ LW_MUST_CHECK enum lw_status lw_distance_shapes(const struct lw_shape *a, const 
 
 // Certificate: how far d may lie above the true distance, from the plane that n spans; no search is involved.
 //   lower = min over core a of n.x - r_a - max over core b of n.x - r_b <= true distance; the gap is d - lower
-// 0 for FAR, whose d is such a bound itself; INFINITY without a normal.
+// 0 for FAR, whose d is such a bound itself; HUGE_VAL without a normal.
 double lw_distance_gap(const struct lw_capsule *link, const struct lw_shape *shape, const struct lw_distance *result);
 double lw_distance_shapes_gap(const struct lw_shape *a, const struct lw_shape *b, const struct lw_distance *result);
 

@@ -13,7 +13,7 @@
 #include "collision/closed.h"   // lw_closed_perpendicular
 #include "collision/distance.h" // LW_DISTANCE_STALLED
 
-#include <math.h>    // sqrt, fabs, INFINITY
+#include <math.h>    // sqrt, fabs, HUGE_VAL
 #include <stdbool.h> // bool
 #include <string.h>  // memcpy
 
@@ -138,7 +138,7 @@ static void set_face(struct polytope *t, struct face *f, int i, int j, int k)
     const bool sliver = !(length > 1e-11 * lw_vec_norm(ij) * lw_vec_norm(ik));
     for (int x = 0; x < 3; x++)
         f->n[x] /= length > 0 ? length : 1;
-    f->offset = sliver ? (double)INFINITY : lw_vec_dot(f->n, t->w[i]);
+    f->offset = sliver ? HUGE_VAL : lw_vec_dot(f->n, t->w[i]);
     f->p[0] = (uint8_t)i;
     f->p[1] = (uint8_t)j;
     f->p[2] = (uint8_t)k;
@@ -241,7 +241,7 @@ static bool grow(struct polytope *t, int cap)
     while (t->best->iterations < cap && t->points < POINTS && t->faces > 0) {
         const int nearest = nearest_face(t);
         const double least = t->face[nearest].offset;
-        if (!(least < (double)INFINITY))
+        if (!(least < HUGE_VAL))
             return false;
         double *w = t->w[t->points];
         (void)support(t, t->face[nearest].n, w); // keeps the least depth
@@ -259,7 +259,7 @@ static bool grow(struct polytope *t, int cap)
 void lw_epa(const struct lw_gjk_query *query, int cap, struct lw_epa_result *out)
 {
     struct polytope t;
-    *out = (struct lw_epa_result){.depth = INFINITY};
+    *out = (struct lw_epa_result){.depth = HUGE_VAL};
     t.query = query;
     t.best = out;
     t.scale = query->size;

@@ -11,7 +11,7 @@
 #include "base/vec.h"           // lw_vec_*
 #include "collision/distance.h" // LW_DISTANCE_*
 
-#include <math.h>    // sqrt, INFINITY, NAN
+#include <math.h>    // sqrt, HUGE_VAL, NAN
 #include <stdbool.h> // bool
 
 static void set_point(const struct lw_gjk_query *query, struct lw_simplex *s, int i, int a, int b)
@@ -57,7 +57,7 @@ static bool start(const struct lw_gjk_query *query, struct lw_simplex *s, struct
         s->count = 1;
         out->iterations = 1;
     }
-    return query->size < (double)INFINITY && lw_simplex_reduce(s, INFINITY);
+    return query->size < HUGE_VAL && lw_simplex_reduce(s, HUGE_VAL);
 }
 
 void lw_gjk(const struct lw_gjk_query *query, struct lw_simplex *s, struct lw_gjk_result *out)
@@ -65,7 +65,7 @@ void lw_gjk(const struct lw_gjk_query *query, struct lw_simplex *s, struct lw_gj
     const double touch = 1e-11 * query->size;
     *out = (struct lw_gjk_result){.bound = 0};
     if (!start(query, s, out)) {
-        s->square = s->v[0] = s->v[1] = s->v[2] = NAN;
+        s->square = s->v[0] = s->v[1] = s->v[2] = (double)NAN;
         out->flags = LW_DISTANCE_STALLED;
         return;
     }

@@ -13,7 +13,7 @@
 #include "collision/cull.h"   // lw_cull_*
 #include "collision/moving.h" // lw_moving_*
 
-#include <math.h>    // isnan, NAN, INFINITY
+#include <math.h>    // isnan, NAN, HUGE_VAL
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
 
@@ -138,7 +138,7 @@ static void measure_tool(const struct lw_near_query *query, const struct lw_shap
         tool.hull.vertex = room;
     }
     if (lw_distance_shapes(&tool, shape, out) != LW_OK)
-        *out = (struct lw_distance){.d = NAN, .flags = LW_DISTANCE_NO_NORMAL}; // of no two of these kinds
+        *out = (struct lw_distance){.d = (double)NAN, .flags = LW_DISTANCE_NO_NORMAL}; // of no two of these kinds
 }
 
 // Distance of a part to obstacle i, where it was seen or moved on from there. False when it is farther than d_max.
@@ -244,7 +244,7 @@ static void measure_self(const struct lw_body *body, const struct lw_placed *pla
         return;
     }
     const struct lw_shape tool = lw_body_tool_shape(body, placed);
-    lw_distance_link(&placed->capsule[pair.part], &tool, (double)INFINITY, NULL, &out->distance);
+    lw_distance_link(&placed->capsule[pair.part], &tool, HUGE_VAL, NULL, &out->distance);
 }
 
 // Whether two parts are farther apart than d_max for certain.

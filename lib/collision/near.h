@@ -56,7 +56,7 @@ struct lw_near_query {
     const struct lw_placed *placed;
     const struct lw_snapshot *world;
     int64_t time_ns;
-    double d_max;               // m; INFINITY = no bound
+    double d_max;               // m; HUGE_VAL = no bound
     struct lw_warm_table *warm; // i/o, may be NULL
 };
 

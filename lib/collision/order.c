@@ -8,7 +8,7 @@
 // Errors   none.
 #include "collision/order.h"
 
-#include <math.h>    // fabs, INFINITY
+#include <math.h>    // fabs, HUGE_VAL
 #include <stdbool.h> // bool
 
 // Of finite numbers, without the calls of fmin and fmax.
@@ -53,8 +53,8 @@ static const struct lw_snapshot_order *sort(struct lw_snapshot_order room[2][LW_
 static void find_extent(const struct lw_snapshot *s, double low[3], double high[3])
 {
     for (int k = 0; k < 3; k++) {
-        low[k] = INFINITY;
-        high[k] = -INFINITY;
+        low[k] = HUGE_VAL;
+        high[k] = -HUGE_VAL;
     }
     for (int i = 0; i < s->count; i++)
         for (int k = 0; k < 3 && s->item[i].shape.kind != LW_HALFSPACE; k++) {
@@ -156,7 +156,7 @@ static void set_box(struct lw_snapshot *s, int at, int first, int last)
     float *c[3] = {&s->box.x[at], &s->box.y[at], &s->box.z[at]};
     double middle[3] = {1e18, 1e18, 1e18}, half[3] = {0, 0, 0};
     for (int k = 0; k < 3 && first < last; k++) {
-        double low = INFINITY, high = -INFINITY;
+        double low = HUGE_VAL, high = -HUGE_VAL;
         for (int i = first; i < last; i++) {
             low = lower(low, s->item[i].shape.c[k] - s->item[i].shape.bound);
             high = higher(high, s->item[i].shape.c[k] + s->item[i].shape.bound);

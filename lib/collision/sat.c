@@ -8,7 +8,7 @@
 // Errors   none.
 #include "collision/closed.h"
 
-#include <math.h>   // sqrt, fabs, INFINITY
+#include <math.h>   // sqrt, fabs, HUGE_VAL
 #include <string.h> // memcpy, memset
 
 // Directions u x e_i shorter than this against u, squared, are left out: there a face does as well.
@@ -25,7 +25,7 @@ static void keep_smaller(double depth, const double n[3], double *best, double b
 
 double lw_sat_box(const double x0[3], const double x1[3], const double half[3], double n[3])
 {
-    double best = INFINITY, u[3];
+    double best = HUGE_VAL, u[3];
     lw_vec_sub(x1, x0, u);
     memset(n, 0, 3 * sizeof *n);
 

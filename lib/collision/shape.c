@@ -10,7 +10,7 @@
 
 #include "base/vec.h" // lw_vec_*, lw_all_finite
 
-#include <math.h>    // sqrt, fabs, isfinite, INFINITY
+#include <math.h>    // sqrt, fabs, isfinite, HUGE_VAL
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
 #include <string.h>  // memcpy
@@ -206,7 +206,7 @@ static void place(const struct lw_solid *solid, const struct lw_pose *pose, doub
         (void)scale_to_unit(shape->halfspace.m, 3); // checked
         shape->halfspace.o = solid->offset / lw_vec_norm(solid->normal) + lw_vec_dot(shape->halfspace.m, pose->p);
         shape->r = 0;
-        shape->bound = INFINITY;
+        shape->bound = HUGE_VAL;
         break;
     case LW_CUSTOM:
         rotate(pose->r, solid->custom_centre, turned);

@@ -10,7 +10,7 @@
 
 #include "base/vec.h" // lw_vec_*
 
-#include <math.h>   // fabs, sqrt, INFINITY
+#include <math.h>   // fabs, sqrt, HUGE_VAL
 #include <string.h> // memcpy
 
 // A nearest point on part of a simplex: the points it needs, in order, and their weights.
@@ -67,7 +67,7 @@ static const int face_across[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}
 static void on_edges(const struct lw_simplex *s, const int corner[3], int edges, struct nearest *out)
 {
     struct nearest candidate;
-    *out = (struct nearest){.square = INFINITY};
+    *out = (struct nearest){.square = HUGE_VAL};
     for (int k = 0; k < 3; k++) {
         if (!(edges & 1 << k))
             continue;
@@ -126,7 +126,7 @@ static void on_triangle(const struct lw_simplex *s, int i, int j, int k, struct 
 static void on_faces(const struct lw_simplex *s, int faces, struct nearest *out)
 {
     struct nearest candidate;
-    *out = (struct nearest){.square = INFINITY};
+    *out = (struct nearest){.square = HUGE_VAL};
     for (int k = 0; k < 4; k++) {
         if (!(faces & 1 << k))
             continue;

@@ -9,7 +9,7 @@
 #include "bus/wire.h" // lw_wire_encode
 #include "malformed.h"
 
-#include <math.h>   // INFINITY
+#include <math.h>   // HUGE_VAL
 #include <stdio.h>  // snprintf
 #include <string.h> // memcpy
 
@@ -223,7 +223,7 @@ static void make_with(struct malformer *m, double bad, struct packet *out)
 
 void make_not_finite(struct malformer *m, struct packet *out)
 {
-    const double bad[] = {(double)NAN, -(double)NAN, (double)INFINITY, -(double)INFINITY};
+    const double bad[] = {(double)NAN, -(double)NAN, HUGE_VAL, -HUGE_VAL};
     make_with(m, bad[random_below(&m->random, 4)], out);
 }
 

@@ -19,7 +19,7 @@ struct wide {
 
 static inline struct wide wide_of(const double p[3])
 {
-    return (struct wide){p[0], p[1], p[2]};
+    return (struct wide){(long double)p[0], (long double)p[1], (long double)p[2]};
 }
 
 // a + scale * b
@@ -82,16 +82,16 @@ static inline long double oracle_segment_segment(const struct wide s[2], const s
     return best;
 }
 
-// Squared distance of a point to the inside of a triangle; INFINITY when its foot is not there. Edges are pairs.
+// Squared distance of a point to the inside of a triangle; HUGE_VAL when its foot is not there. Edges are pairs.
 static inline long double oracle_point_triangle(struct wide p, struct wide a, struct wide b, struct wide c)
 {
     const struct wide ab = wide_sub(b, a), ac = wide_sub(c, a), n = wide_cross(ab, ac), ap = wide_sub(p, a);
     const long double nn = wide_dot(n, n);
     if (!(nn > 0))
-        return (long double)INFINITY;
+        return (long double)HUGE_VAL;
     const long double at_b = wide_dot(wide_cross(ap, ac), n) / nn, at_c = wide_dot(wide_cross(ab, ap), n) / nn;
     if (!(at_b >= 0 && at_c >= 0 && at_b + at_c <= 1))
-        return (long double)INFINITY;
+        return (long double)HUGE_VAL;
     const struct wide v = wide_add(wide_add(ap, -at_b, ab), -at_c, ac);
     return wide_dot(v, v);
 }
@@ -99,7 +99,7 @@ static inline long double oracle_point_triangle(struct wide p, struct wide a, st
 // Distance of two hulls: vertices to triangles of the other, and edges to edges.
 static inline long double oracle_apart(const struct wide *v, int n, const struct wide *w, int m)
 {
-    long double best = (long double)INFINITY, other;
+    long double best = (long double)HUGE_VAL, other;
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
             const struct wide edge[2] = {v[i], v[j]};
@@ -132,7 +132,7 @@ static inline void oracle_part(const struct wide *v, int n, const struct wide *w
     const long double square = wide_dot(normal, normal), length = sqrtl(square);
     if (!(square > 1e-24L * wide_dot(edge[0], edge[0]) * wide_dot(edge[1], edge[1])))
         return;
-    long double low[2] = {(long double)INFINITY, (long double)INFINITY}, high[2] = {-low[0], -low[0]};
+    long double low[2] = {(long double)HUGE_VAL, (long double)HUGE_VAL}, high[2] = {-low[0], -low[0]};
     for (int i = 0; i < n + m; i++) {
         const long double height = wide_dot(i < n ? v[i] : w[i - n], normal);
         low[i >= n] = height < low[i >= n] ? height : low[i >= n];
@@ -146,7 +146,7 @@ static inline void oracle_part(const struct wide *v, int n, const struct wide *w
 // Every face of the difference is a face of one hull, or spanned by an edge of each.
 static inline long double oracle_depth(const struct wide *v, int n, const struct wide *w, int m)
 {
-    long double depth = (long double)INFINITY;
+    long double depth = (long double)HUGE_VAL;
     for (int side = 0; side < 2; side++) {
         const struct wide *x = side ? w : v;
         for (int i = 0; i < (side ? m : n); i++)
@@ -191,7 +191,7 @@ static inline long double oracle_distance(const double *a, int n, const double *
     // Two hulls in one plane have a depth of rounding beside each other too: one inside the other is no farther from
     // its surface than it is deep.
     const long double depth = oracle_depth(v, n, w, m), apart = oracle_apart(v, n, w, m);
-    return depth > 0 && depth < (long double)INFINITY && apart <= depth + 1e-15L ? -depth : apart;
+    return depth > 0 && depth < (long double)HUGE_VAL && apart <= depth + 1e-15L ? -depth : apart;
 }
 
 #endif

@@ -250,7 +250,7 @@ static inline void pair_set_link(struct random *random, enum pair_class class, c
 static inline bool pair_bring_to(struct pair *pair, double d)
 {
     struct lw_distance found;
-    lw_distance_link(&pair->link, &pair->shape, INFINITY, NULL, &found);
+    lw_distance_link(&pair->link, &pair->shape, HUGE_VAL, NULL, &found);
     if (found.flags & LW_DISTANCE_CORE)
         return false;
     pair_shift(&pair->link, d - found.d, found.n);

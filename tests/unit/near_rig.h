@@ -166,7 +166,7 @@ static inline struct lw_distance rig_distance(const struct near_rig *rig, const 
         const struct lw_shape tool = lw_body_tool_shape(&rig->body, &rig->placed);
         assert_int_equal(lw_distance_shapes(&tool, &shape, &found), LW_OK);
     } else {
-        lw_distance_link(&rig->placed.capsule[part], &shape, (double)INFINITY, NULL, &found);
+        lw_distance_link(&rig->placed.capsule[part], &shape, HUGE_VAL, NULL, &found);
     }
     return found;
 }

@@ -143,7 +143,7 @@ static void turning_base_and_world_together(void **state)
         memcpy(turned, q, sizeof q);
         turned[0] += angle;
         for (int turn = 0; turn < 2; turn++) {
-            struct lw_near_query query = rig_query(rig, SECOND, (double)INFINITY);
+            struct lw_near_query query = rig_query(rig, SECOND, HUGE_VAL);
             rig_build(rig, &rig->world);
             rig_pose(rig, LW_UR5, turn ? turned : q);
             lw_near_smallest(&query, turn ? &there : &here);
@@ -177,7 +177,7 @@ static void a_part_without_length(void **state)
         struct lw_near each[LW_BODY_MAX];
         struct lw_distance ball;
         rig_random_pose(rig, LW_UR10);
-        const struct lw_near_query query = rig_query(rig, SECOND, (double)INFINITY);
+        const struct lw_near_query query = rig_query(rig, SECOND, HUGE_VAL);
         lw_near_each(&query, each);
         const struct lw_shape sphere = {
             .kind = LW_SPHERE, .r = wrist->r, .segment = lw_shape_of_capsule(&rig->placed.capsule[5]).segment};
@@ -208,11 +208,11 @@ static void tools_are_checked(void **state)
     tool = rig_tool(&random, LW_TOOL_CAPSULE);
     tool.capsule.r = 0;
     assert_int_equal(lw_tool_check(&tool, NULL), LW_E_ARGUMENT);
-    tool.capsule.r = (double)INFINITY;
+    tool.capsule.r = HUGE_VAL;
     assert_int_equal(lw_tool_check(&tool, NULL), LW_E_NOT_FINITE);
     tool = rig_tool(&random, LW_TOOL_HULL);
     assert_int_equal(lw_tool_check(&tool, &reason), LW_OK);
-    tool.vertex[7] = (double)INFINITY;
+    tool.vertex[7] = HUGE_VAL;
     assert_int_equal(lw_tool_check(&tool, &reason), LW_E_NOT_FINITE);
     for (int count = 0; count < 2; count++) {
         tool = rig_tool(&random, LW_TOOL_HULL);

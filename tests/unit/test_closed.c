@@ -17,7 +17,7 @@ static struct lw_distance distance(const struct lw_capsule *link, const struct l
 {
     struct lw_distance out;
     memset(&out, 0x55, sizeof out);
-    lw_distance_link(link, shape, INFINITY, NULL, &out);
+    lw_distance_link(link, shape, HUGE_VAL, NULL, &out);
     return out;
 }
 

@@ -18,7 +18,7 @@ static struct lw_distance distance(const struct lw_capsule *link, const struct l
 {
     struct lw_distance out;
     memset(&out, 0x55, sizeof out);
-    lw_distance_link(link, shape, INFINITY, NULL, &out);
+    lw_distance_link(link, shape, HUGE_VAL, NULL, &out);
     return out;
 }
 
@@ -50,7 +50,7 @@ static void a_nan_comes_out(void **state)
         pair.link.r = 0.1;
         const int which = n % 7;
         double *number = which < 3 ? &pair.link.a[which] : which < 6 ? &pair.link.b[which - 3] : &pair.link.r;
-        *number = n / 35 % 2 ? (double)NAN : (double)INFINITY;
+        *number = n / 35 % 2 ? (double)NAN : HUGE_VAL;
         const struct lw_distance found = distance(&pair.link, &pair.shape);
         assert_true(!isfinite(found.d));
     }

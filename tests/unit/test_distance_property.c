@@ -61,7 +61,7 @@ static void dump(const struct pair *pair, enum pair_class class, const char *wha
 static void pair_support(const void *object, const ccd_vec3_t *direction, ccd_vec3_t *out)
 {
     const struct pair *pair = object;
-    double best = -INFINITY;
+    double best = -HUGE_VAL;
     for (int i = 0; i < pair->count; i++) {
         const double height = lw_vec_dot(pair->points[i], direction->v);
         if (height <= best)
@@ -94,14 +94,14 @@ static void check_pair(const struct pair *pair, enum pair_class class, struct wo
 {
     struct lw_distance found;
     const double radii = pair->link.r + pair->shape.r;
-    lw_distance_link(&pair->link, &pair->shape, INFINITY, NULL, &found);
+    lw_distance_link(&pair->link, &pair->shape, HUGE_VAL, NULL, &found);
     assert_false(found.flags & (LW_DISTANCE_CAPPED | LW_DISTANCE_STALLED | LW_DISTANCE_FAR | LW_DISTANCE_NO_NORMAL));
 
     double ends[2][3];
     memcpy(ends[0], pair->link.a, sizeof ends[0]);
     memcpy(ends[1], pair->link.b, sizeof ends[1]);
     const long double core = oracle_distance(ends[0], 2, pair->points[0], pair->count);
-    const double error = fabs((double)(found.d - (core - radii)));
+    const double error = fabs((double)((long double)found.d - (core - (long double)radii)));
     const double gap = fabs(lw_distance_gap(&pair->link, &pair->shape, &found));
     double identity = fabs(lw_vec_norm(found.n) - 1);
     for (int k = 0; k < 3; k++)

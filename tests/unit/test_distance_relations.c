@@ -15,7 +15,7 @@ static struct lw_distance distance(const struct lw_capsule *link, const struct l
 {
     struct lw_distance out;
     memset(&out, 0x55, sizeof out);
-    lw_distance_link(link, shape, INFINITY, NULL, &out);
+    lw_distance_link(link, shape, HUGE_VAL, NULL, &out);
     return out;
 }
 
@@ -177,7 +177,7 @@ static void a_stale_warm_start_changes_nothing(void **state)
         pair_make(&random, (enum pair_class)(n % 3 ? RANDOM : random_below(&random, CLASSES)), &pair);
         pair.shape.id = 7;
         pair.shape.generation = 3;
-        lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+        lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
         const struct lw_distance cold = distance(&pair.link, &pair.shape);
         if (fabs(cold.d + pair.link.r + pair.shape.r) > 1e-5) // else the search may end on either side of contact
             check_same(&found, &cold);
@@ -200,10 +200,10 @@ static void coherent_motion_takes_one_support(void **state)
         pair_set_link(&random, RANDOM, zero, &pair);
         pair.shape.id = 1;
         pair_direction(&random, direction);
-        lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+        lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
         for (int k = 0; k < 100 && !(found.flags & LW_DISTANCE_CORE); k++) {
             pair_shift(&pair.link, 1e-3, direction);
-            lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+            lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
             const struct lw_distance cold = distance(&pair.link, &pair.shape);
             check_same(&found, &cold);
             queries++;
@@ -229,11 +229,11 @@ static void a_foreign_warm_start_is_not_used(void **state)
             pair.shape.id = 5;
             pair.shape.generation = 9;
             good = (struct lw_warm){0};
-            lw_distance_link(&pair.link, &pair.shape, INFINITY, &good, &cold);
+            lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &good, &cold);
         } while (cold.flags != 0 || cold.iterations < 3);
         assert_true(good.id == 5 && good.generation == 9 && good.count >= 1 && good.count <= 3);
         warm = good;
-        lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+        lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
         assert_true(found.iterations < cold.iterations);
         for (int wrong = 0; wrong < 5; wrong++) {
             warm = good;
@@ -242,7 +242,7 @@ static void a_foreign_warm_start_is_not_used(void **state)
             warm.count = (uint8_t)(wrong == 2 ? 4 : warm.count);
             warm.a[0] = (uint8_t)(wrong == 3 ? 2 : warm.a[0]);
             warm.b[0] = (uint8_t)(wrong == 4 ? pair.count : warm.b[0]);
-            lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+            lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
             assert_same_bits(&found, &cold, sizeof found);
             assert_same_bits(&warm, &good, sizeof warm);
         }
@@ -251,7 +251,7 @@ static void a_foreign_warm_start_is_not_used(void **state)
         pair.shape.generation = 0;
         warm = (struct lw_warm){.count = 1};
         const struct lw_warm before = warm;
-        lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+        lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
         assert_same_bits(&found, &cold, sizeof found);
         assert_same_bits(&warm, &before, sizeof warm);
     }
@@ -271,7 +271,7 @@ static void overlap_clears_the_warm_start(void **state)
         pair_set_shape(&random, RANDOM, LW_HULL, zero, &pair);
         pair_set_link(&random, CORE_OVERLAP, zero, &pair);
         pair.shape.id = 2;
-        lw_distance_link(&pair.link, &pair.shape, INFINITY, &warm, &found);
+        lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, &warm, &found);
         if (!(found.flags & LW_DISTANCE_CORE))
             continue;
         cleared++;

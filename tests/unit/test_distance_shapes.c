@@ -115,7 +115,7 @@ static void any_shape_over_a_half_space(void **state)
         static struct pair a;
         struct lw_solid solid = {.kind = LW_HALFSPACE, .offset = random_in(&random, -1, 1)};
         struct lw_shape wall;
-        double lowest = INFINITY;
+        double lowest = HUGE_VAL;
         set_shape(&random, kinds[n % 4], &a);
         pair_direction(&random, solid.normal);
         assert_int_equal(lw_shape_make(&solid, &origin, NULL, &wall, NULL), LW_OK);
@@ -141,7 +141,7 @@ static void any_shape_over_a_half_space(void **state)
 static void points_support(const void *object, const ccd_vec3_t *direction, ccd_vec3_t *out)
 {
     const struct pair *pair = object;
-    double best = -INFINITY;
+    double best = -HUGE_VAL;
     for (int i = 0; i < pair->count; i++) {
         const double height = lw_vec_dot(pair->points[i], direction->v);
         if (height <= best)
@@ -218,8 +218,8 @@ static void custom_shapes_equal_the_built_in_ones(void **state)
         const struct lw_shape custom_a = custom_shape(&of_a, a.shape.c, a.shape.bound, a.shape.r);
         const struct lw_shape custom_b = custom_shape(&of_b, b.shape.c, b.shape.bound, b.shape.r);
 
-        lw_distance_link(&a.link, &a.shape, INFINITY, NULL, &built_in);
-        lw_distance_link(&a.link, &custom_a, INFINITY, NULL, &found);
+        lw_distance_link(&a.link, &a.shape, HUGE_VAL, NULL, &built_in);
+        lw_distance_link(&a.link, &custom_a, HUGE_VAL, NULL, &found);
         const double radii = a.link.r + a.shape.r;
         if (fabs(built_in.d + radii) > 1e-12)
             check_custom(&found, &built_in, radii);
@@ -256,8 +256,8 @@ static void smooth_custom_shapes(void **state)
         const struct lw_custom custom = {ball_support, &ball};
         const struct lw_shape shape = custom_shape(&custom, ball.c, ball.r, 0.03);
         pair.shape.r = ball.r + 0.03;
-        lw_distance_link(&pair.link, &pair.shape, INFINITY, NULL, &built_in);
-        lw_distance_link(&pair.link, &shape, INFINITY, NULL, &found);
+        lw_distance_link(&pair.link, &pair.shape, HUGE_VAL, NULL, &built_in);
+        lw_distance_link(&pair.link, &shape, HUGE_VAL, NULL, &found);
         const double core = built_in.d + pair.link.r + 0.03;
         if (core < -1e-6) {
             overlaps++;
@@ -284,7 +284,7 @@ static void custom_shapes_far_away_are_bounded(void **state)
         pair_set_link(&random, RANDOM, zero, &pair);
         const struct lw_custom custom = {points_support, &pair};
         const struct lw_shape shape = custom_shape(&custom, pair.shape.c, pair.shape.bound, pair.shape.r);
-        lw_distance_link(&pair.link, &shape, INFINITY, NULL, &exact);
+        lw_distance_link(&pair.link, &shape, HUGE_VAL, NULL, &exact);
         lw_distance_link(&pair.link, &shape, d_max, NULL, &bounded);
         if (bounded.flags & LW_DISTANCE_FAR) {
             far++;

@@ -90,7 +90,7 @@ static void every_number_of_obstacles(void **state)
             rig_build(rig, &rig->world);
             for (int pose = 0; pose < 5; pose++) {
                 rig_random_pose(rig, LW_UR10);
-                check_all(rig, pose == 4 ? (double)INFINITY : random_in(&rig->random, 0, 0.3));
+                check_all(rig, pose == 4 ? HUGE_VAL : random_in(&rig->random, 0, 0.3));
             }
         }
 }
@@ -152,7 +152,7 @@ static void half_spaces(void **state)
         rig_build(rig, &rig->world);
         rig_random_pose(rig, LW_UR10);
         check_all(rig, 0.5);
-        check_all(rig, (double)INFINITY);
+        check_all(rig, HUGE_VAL);
     }
 }
 

@@ -73,7 +73,7 @@ static void check_result(const struct near_rig *rig, const struct lw_near *near,
     struct lw_capsule point = {.r = 0};
     memcpy(point.a, d->pb, sizeof point.a);
     memcpy(point.b, d->pb, sizeof point.b);
-    lw_distance_link(&point, shape, (double)INFINITY, NULL, &on);
+    lw_distance_link(&point, shape, HUGE_VAL, NULL, &on);
     assert_near(on.d, 0, d->d < 0 ? -2 * d->d : 1e-9);
     if (shape->kind == LW_HALFSPACE)
         assert_all_near(d->n, shape->halfspace.m, 3, 1e-12);
@@ -175,7 +175,7 @@ static void velocity_without_a_time(void **state)
     rig_build(rig, &rig->world);
     rig_random_pose(rig, LW_UR5);
     struct lw_near now, later;
-    struct lw_near_query query = rig_query(rig, SECOND, (double)INFINITY);
+    struct lw_near_query query = rig_query(rig, SECOND, HUGE_VAL);
     lw_near_smallest(&query, &now);
     query.time_ns = 2 * SECOND;
     lw_near_smallest(&query, &later);
@@ -199,7 +199,7 @@ static struct sample sample_at(struct near_rig *rig, const double q[LW_NJ], cons
     const int part = 4;
     assert_int_equal(lw_arm_fk(lw_arm_get(LW_UR10), q, frame), LW_OK);
     lw_body_place(&rig->body, frame, &rig->placed);
-    struct lw_near_query query = rig_query(rig, time_ns, (double)INFINITY);
+    struct lw_near_query query = rig_query(rig, time_ns, HUGE_VAL);
     query.warm = NULL;
     lw_near_each(&query, near);
     const struct lw_distance *d = &near[part].distance;

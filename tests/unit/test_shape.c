@@ -83,7 +83,7 @@ static void every_kind_is_taken(void **state)
 static void numbers_that_are_none_are_refused(void **state)
 {
     (void)state;
-    const double bad[3] = {NAN, INFINITY, -INFINITY};
+    const double bad[3] = {(double)NAN, HUGE_VAL, -HUGE_VAL};
     for (int i = 0; i < 3; i++) {
         double vertex[24];
         memcpy(vertex, cube, sizeof vertex);
@@ -218,7 +218,7 @@ static void unit_vectors_may_be_off_by_a_thousandth(void **state)
     (void)state;
     struct lw_pose pose;
     struct lw_shape shape;
-    const double p[3] = {1, 2, 3}, q[4] = {0.5, 0.5, 0.5, 0.5}, bad[4] = {0.5, NAN, 0.5, 0.5};
+    const double p[3] = {1, 2, 3}, q[4] = {0.5, 0.5, 0.5, 0.5}, bad[4] = {0.5, (double)NAN, 0.5, 0.5};
     for (int i = -2; i <= 2; i += 4) {
         const double scale = 1 + 0.0007 * i; // 1.4e-3 off
         struct lw_solid solid = good(LW_HALFSPACE);

@@ -72,7 +72,7 @@ static void the_nearest_point_is_exact(void **state)
     for (int n = 0; n < ROUNDS; n++) {
         const struct lw_simplex before = make(&random);
         struct lw_simplex s = before;
-        assert_true(lw_simplex_reduce(&s, INFINITY));
+        assert_true(lw_simplex_reduce(&s, HUGE_VAL));
         if (s.count == 4) {
             inside++;
             assert_near(s.square, 0, 0);
@@ -115,9 +115,9 @@ static void no_progress_drops_the_newest_point(void **state)
         expected.count--;
         assert_same_bits(&s, &expected, sizeof s);
         struct lw_simplex bad = before;
-        bad.w[0][1] = NAN;
+        bad.w[0][1] = (double)NAN;
         bad.count = 1;
-        assert_false(lw_simplex_reduce(&bad, INFINITY));
+        assert_false(lw_simplex_reduce(&bad, HUGE_VAL));
     }
 }
 

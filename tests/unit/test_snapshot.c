@@ -156,7 +156,7 @@ static void no_point_is_faster_than_speed_max(void **state)
             double arm[3], speed[3];
             random_fill(&rig->random, -1.5, 1.5, probe.a, 3);
             memcpy(probe.b, probe.a, sizeof probe.b);
-            lw_distance_link(&probe, &shape, (double)INFINITY, NULL, &found);
+            lw_distance_link(&probe, &shape, HUGE_VAL, NULL, &found);
             if (found.flags & LW_DISTANCE_CORE || lw_vec_norm(found.pb) > 3)
                 continue;
             lw_vec_sub(found.pb, told->pose.p, arm);
@@ -209,7 +209,7 @@ static void spoil(struct told *bad, int way)
     switch (way) {
     case 0: bad->id = 0; break;
     case 1: bad->id = -3; break;
-    case 2: bad->motion.v[k] = (double)INFINITY; break;
+    case 2: bad->motion.v[k] = HUGE_VAL; break;
     case 3: bad->motion.omega[k] = NO_NUMBER; break;
     case 4: bad->motion.time_ns = -1; break;
     case 5: bad->motion.expires_ns = -1; break;

@@ -83,6 +83,7 @@ class Status:
     """One status message in words; names and meaning as in lcmtypes/status_t.lcm."""
 
     session: int
+    mono_ns: int  # of the message
     state: str
     faults: list[str]
     faults_ever: list[str]
@@ -118,6 +119,7 @@ def status_of(message: Any) -> Status:
     """Put a decoded status_t into words."""
     return Status(
         session=message.h.session,
+        mono_ns=message.h.mono_ns,
         state=state_name(message.state),
         faults=fault_names(message.faults),
         faults_ever=fault_names(message.faults_ever),

@@ -162,6 +162,15 @@ def _clearance(sender: Sender) -> Text:
     return Text("-" if clearance is None else f"{clearance:.4f} m")
 
 
+def _goal(sender: Sender) -> Text:
+    found = sender.status
+    if sender.program != "controller":
+        return Text("-")
+    stuck_s = (found.mono_ns - found.stuck_since_ns) / 1e9
+    word = f", stuck for {stuck_s:.0f} s" if found.stuck_since_ns else ""
+    return Text(f"{found.deviation:.4f} m away{word}", "bold red" if word else "")
+
+
 def _messages(sender: Sender) -> Text:
     found = sender.status
     text = f"{found.taken}, {found.missed} missed, {found.unsent} unsent"
@@ -193,6 +202,7 @@ ROWS: dict[str, Callable[[Sender], Text]] = {
     "page faults": _page_faults,
     "allocations": _allocations,
     "clearance": _clearance,
+    "goal": _goal,
 }
 
 

@@ -32,13 +32,15 @@ extern "C" {
 #include <coal/shape/geometric_shapes.h>
 #endif
 
-// The linker puts this before every query of one pair.
+// The linker puts this before every query of one pair; the names are those that ld --wrap asks for.
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming)
 extern "C" {
 void __real_lw_distance_link(const lw_capsule *link, const lw_shape *shape, double d_max, lw_warm *warm,
                              lw_distance *out);
 void __wrap_lw_distance_link(const lw_capsule *link, const lw_shape *shape, double d_max, lw_warm *warm,
                              lw_distance *out);
 }
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 namespace
 {
@@ -144,7 +146,7 @@ double sum; // keeps the compiler from leaving queries out
 
 void ours(bool each)
 {
-    const lw_near_query query = {&body, &placed, &world, 0, each ? static_cast<double>(INFINITY) : D_MAX, &warm};
+    const lw_near_query query = {&body, &placed, &world, 0, each ? HUGE_VAL : D_MAX, &warm};
     if (each)
         lw_near_each(&query, nearest);
     else
@@ -277,7 +279,7 @@ void theirs(bool each)
     for (r.part = 0; r.part < PARTS; r.part++) {
         coal::CollisionObject *link = r.links[r.part].get();
         if (each) {
-            r.least = static_cast<double>(INFINITY);
+            r.least = HUGE_VAL;
             r.tree.distance(link, &r);
             sum += r.least;
             continue;
@@ -328,7 +330,7 @@ bool agree(bool each, figures &f)
     double apart = 0;
     rival &r = *coal_side;
     for (r.part = 0; r.part < PARTS; r.part++) {
-        r.least = static_cast<double>(INFINITY);
+        r.least = HUGE_VAL;
         r.tree.distance(r.links[r.part].get(), &r);
         apart = std::max(apart, std::abs(r.least - nearest[r.part].distance.d));
     }
@@ -389,6 +391,7 @@ bool contest(bool each, int ticks)
 
 } // namespace
 
+// NOLINTNEXTLINE(bugprone-reserved-identifier,readability-identifier-naming)
 void __wrap_lw_distance_link(const lw_capsule *link, const lw_shape *shape, double d_max, lw_warm *warm_start,
                              lw_distance *out)
 {

@@ -96,7 +96,7 @@ bool make(const contest &c, pair &p, uint32_t id)
         p.link.b[k] = p.link.a[k] + 0.4 * uniform();
     }
     lw_distance found;
-    lw_distance_link(&p.link, &p.shape, INFINITY, nullptr, &found);
+    lw_distance_link(&p.link, &p.shape, HUGE_VAL, nullptr, &found);
     return found.d > 0.02 && found.d < 0.5;
 }
 
@@ -108,7 +108,7 @@ long iterations;
 void ours(pair &p, bool warm)
 {
     lw_distance found;
-    lw_distance_link(&p.link, &p.shape, INFINITY, warm ? &p.warm : nullptr, &found);
+    lw_distance_link(&p.link, &p.shape, HUGE_VAL, warm ? &p.warm : nullptr, &found);
     sum += found.d;
     iterations += found.iterations;
 }
@@ -172,7 +172,7 @@ double largest_difference()
     double largest = 0;
     for (const pair &p : pairs()) {
         lw_distance found;
-        lw_distance_link(&p.link, &p.shape, INFINITY, nullptr, &found);
+        lw_distance_link(&p.link, &p.shape, HUGE_VAL, nullptr, &found);
         largest = std::max(largest, std::abs(theirs(p, false) - found.d));
     }
     return largest;
