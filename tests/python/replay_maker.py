@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from leeway_lcm import leeway as wire
-from log_maker import event, obstacles, scene, stamp
+from log_maker import event, hull, obstacles, scene, stamp
 
 from leeway import _native
 
@@ -57,6 +57,17 @@ class Recorder:
             assert self.world.apply(data)
         if how.get("logged", True):
             self.log.append(("OBSTACLES", data))
+        return data
+
+    def hull(self, sender: int, seq: int, number: int, count: int = 8) -> bytes:
+        """Send HULL, moving and with a time; heard and logged."""
+        vertices = [(0.05 * (k % 2), 0.05 * (k // 2 % 2), 0.05 * (k // 4)) for k in range(count)]
+        m = hull(sender, seq, number, (0.5, -0.6, 0.4), vertices)
+        m.time_ns, m.valid_for_ms = self.now, 1000
+        m.o.v, m.o.omega = [0.1, 0.0, 0.0], [0.0, 0.0, 0.5]
+        data = bytes(m.encode())
+        assert self.world.apply(data, True)
+        self.log.append(("HULL", data))
         return data
 
     def request(self, sender: int, seq: int, goal: tuple[float, float, float] | None) -> None:
