@@ -35,6 +35,8 @@ def test_obstacles_in_force_follow_the_echo_not_the_order_of_the_log(tmp_path: P
     run.inserted[15] = [("OBSTACLES", obstacles(SOURCE, 2, 1, [(900, (0.0, 0.0, 0.0), 0.0)]))]
     see(run, slice(10, 20), SOURCE, 1)  # taken in five ticks after it was logged
     see(run, slice(20, 31), SOURCE, 2)
+    for command in run.commands[10:20]:
+        command.clearance, command.clearance_link, command.clearance_obstacle = 0.3, 5, 900
     a = analysed(run, tmp_path)
     assert np.flatnonzero((a.nearest_obstacle == 900).any(axis=1)).tolist() == list(range(10, 20))
     centre = np.linalg.norm(a.points[12, 4] - near)
@@ -49,7 +51,7 @@ def test_obstacles_in_force_follow_the_echo_not_the_order_of_the_log(tmp_path: P
     ]
     assert 10 * PERIOD - 1e-9 <= a.smallest.t < 20 * PERIOD
     assert a.smallest.obstacle == 900
-    assert a.smallest.point >= 2
+    assert (a.smallest.distance, a.smallest.link) == (0.3, 5)
 
 
 def test_repeated_message_is_taken_where_it_came_last(tmp_path: Path) -> None:
@@ -219,11 +221,13 @@ def test_a_moving_obstacle_is_where_it_was_at_the_tick(tmp_path: Path) -> None:
 def test_no_obstacle_means_no_distance(tmp_path: Path) -> None:
     run = Run(ticks=5)
     run.before[2] = ("OBSTACLES", obstacles(PLANT, 1, 2, []))
+    for command in run.commands:
+        command.clearance, command.clearance_link, command.clearance_obstacle = np.inf, 0, 0
     a = analysed(run, tmp_path)
     assert np.isnan(a.smallest_distance)
     assert a.to_json()["smallest_distance"] == {
         "distance": None,
-        "point": 0,
+        "link": 0,
         "obstacle": 0,
         "t": None,
     }

@@ -71,7 +71,7 @@ def print_table(analyses: list[Any]) -> None:
         "case",
         "rho [m]",
         "final deviation [m]",
-        "smallest distance [m]",
+        "smallest clearance [m]",
         "ticks",
         "late ticks",
     ):

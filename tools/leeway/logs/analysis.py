@@ -33,6 +33,8 @@ FLAGS = {
     "waiting": 64,
     "foreign": 128,
     "warming_up": 256,
+    "clearance": 512,
+    "contact": 1024,
 }
 MOVING_POINTS = slice(1, 6)  # point 1 lies on axis 1 and never moves
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
@@ -40,10 +42,10 @@ PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
 
 @dataclass(frozen=True)
 class Nearest:
-    """Smallest distance of a run."""
+    """Smallest clearance of a run, as the controller's ticks found it."""
 
-    distance: float  # m, to the surface; NaN when there was no obstacle
-    point: int  # control point 2..6, 0 = none
+    distance: float  # m, between the surfaces; NaN when there was no obstacle
+    link: int  # 1..6, with control points their number; 0 = none
     obstacle: int  # id, 0 = none
     t: float  # s
 
@@ -76,6 +78,7 @@ class Analysis:
     deviation: Floats  # (n,)
     distances: Floats  # (n, 6) to the nearest surface, NaN = no obstacle
     nearest_obstacle: Ints  # (n, 6) its id, 0 = none
+    clearance: Floats  # (n,) of the whole arm as the commands tell it, NaN = no obstacle
     flags: Ints  # (n,) bits as in FLAGS
     world: WorldLine
     wake_us: Floats  # (n,) lateness of the wake-up
@@ -117,7 +120,7 @@ class Analysis:
 
     @property
     def smallest_distance(self) -> float:
-        """Smallest distance of points 2..6 to an obstacle's surface, m; NaN without obstacles."""
+        """Smallest clearance of the arm, or of its control points, m; NaN without obstacles."""
         return self.smallest.distance
 
     @property
@@ -244,6 +247,7 @@ def analyse(log: Log) -> Analysis:
         deviation=np.linalg.norm(goal - points[:, 5], axis=1),
         distances=distances,
         nearest_obstacle=obstacle,
+        clearance=np.where(np.isfinite(commands.clearance), commands.clearance, np.nan),
         flags=commands.flags,
         world=line,
         wake_us=commands.wake_late_ns / 1e3,
@@ -254,7 +258,7 @@ def analyse(log: Log) -> Analysis:
         plant_qd=states.qd,
         plant_qdd=motion.plant_qdd,
         limits=uses,
-        smallest=_smallest(motion.t, distances, obstacle),
+        smallest=_smallest(motion.t, commands),
         distance_check=_compare(distances, commands.clearance, scene["law"]["control_points"]),
         late_ticks=0 if lockstep else int(commands.skipped[-1] - commands.skipped[0]),
         losses=motion.losses | {"worlds_unknown": line.unknown_ticks},
@@ -309,13 +313,13 @@ def _goal_in_force(commands: Commands, scene_goal: list[float]) -> Floats:
     return goal[newest][1:]
 
 
-def _smallest(t: Floats, distances: Floats, obstacle: Ints) -> Nearest:
-    moving = distances[:, MOVING_POINTS]
-    if not np.isfinite(moving).any():
+def _smallest(t: Floats, commands: Commands) -> Nearest:
+    known = np.where(np.isfinite(commands.clearance), commands.clearance, np.inf)
+    row = int(np.argmin(known))
+    if known[row] == np.inf:
         return Nearest(math.nan, 0, 0, math.nan)
-    row, column = np.unravel_index(np.nanargmin(moving), moving.shape)
-    point = int(column) + 2
-    return Nearest(float(moving[row, column]), point, int(obstacle[row, point - 1]), float(t[row]))
+    link, obstacle = int(commands.clearance_link[row]), int(commands.clearance_obstacle[row])
+    return Nearest(float(known[row]), link, obstacle, float(t[row]))
 
 
 def _compare(distances: Floats, reported: Floats, control_points: str) -> float:

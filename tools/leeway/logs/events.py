@@ -16,7 +16,7 @@ from leeway.logs.programs import statuses_of
 from leeway.logs.world import World, WorldLine
 from leeway.status import fault_names
 
-STOPPED, STALE, NOT_FINITE, FOREIGN = 8, 16, 32, 128
+STOPPED, STALE, NOT_FINITE, FOREIGN, CONTACT = 8, 16, 32, 128, 1024
 BEFORE, DURING, AFTER = range(3)  # the motion
 _OTHERS_SHOWN = 10  # other sessions of controllers or of plants that are events of their own
 FAULT_S = 1.0  # a status tells the faults of the second before it
@@ -28,7 +28,7 @@ class Event:
     """One thing that happened."""
 
     t: float  # s of motion; below 0 or beyond the end for what happened outside of it
-    kind: str  # start, obstacle, goal, stop, stale, foreign, fault, plant, restart, end, log
+    kind: str  # start, obstacle, goal, stop, stuck, contact, stale, foreign, fault, plant, ...
     text: str
 
 
@@ -49,6 +49,7 @@ def list_events(
     events += _obstacle_events(motion.t, line, sources)
     events += _goal_events(log, motion, goal)
     events += _flag_events(motion)
+    events += _stuck_events(motion)
     events += _plant_events(motion)
     for program, statuses in statuses_of(log, motion).items():
         events += _fault_events(program, statuses, motion)
@@ -185,11 +186,30 @@ def _flag_events(motion: Motion) -> Iterator[Event]:
         STALE: ("stale", "no fresh joint state: braked", (DURING, *alone)),
         NOT_FINITE: ("stale", "a value was no number: braked", (DURING,)),
         FOREIGN: ("foreign", "another controller commands the plant", (BEFORE, DURING, AFTER)),
+        CONTACT: ("contact", "a link is inside an obstacle: braked", (DURING,)),
     }
     for bit, (kind, text, told) in kinds.items():
         for first, last in _spans((flags & bit != 0) & np.isin(where, told)):
             start, end = float(t[first]), float(t[last])
             yield Event(start, kind, f"{text}, {last - first + 1} ticks until {end:.3f} s")
+
+
+def _stuck_events(motion: Motion) -> Iterator[Event]:
+    """Yield when the tip was stuck, and when a way out was tried."""
+    c = motion.commands
+    for first, last in _spans(c.stuck_since_ns != 0):
+        start, end = float(motion.t[first]), float(motion.t[last])
+        far = f"{float(c.deviation[first]):.3f} m from the goal"
+        yield Event(start, "stuck", f"the tip is stuck {far} until {end:.3f} s")
+    turned = np.any(np.diff(c.circulation, axis=0) != 0, axis=1)
+    for row in np.flatnonzero(turned) + 1:
+        axis = ", ".join(f"{float(v):g}" for v in np.round(c.circulation[row], 3))
+        text = (
+            f"way out: circulation about ({axis})"
+            if c.circulation[row].any()
+            else "the circulation ends"
+        )
+        yield Event(float(motion.t[row]), "stuck", text)
 
 
 # --- processes ---

@@ -75,4 +75,6 @@ def _p99(values: Ints) -> Floats:
 def _message(statuses: Statuses, row: int) -> SimpleNamespace:
     """Return one message as a decoded status_t has it."""
     values = {f.name: getattr(statuses, f.name)[row].tolist() for f in fields(statuses)}
-    return SimpleNamespace(h=SimpleNamespace(session=values["session"]), **values)
+    return SimpleNamespace(
+        h=SimpleNamespace(session=values["session"], mono_ns=values["mono_ns"]), **values
+    )

@@ -120,18 +120,21 @@ def deviation(a: Analysis) -> Figure:
 
 
 def distances(a: Analysis) -> Figure:
-    """Distance of every moving control point to the nearest surface, with the reach rho."""
-    figure, axes = _time_axes("Distance of the control points to the nearest obstacle", "d [m]")
+    """Clearance of the arm and distance of every moving origin, with the reach rho."""
+    figure, axes = _time_axes("Distance of arm and frame origins to obstacles", "d [m]")
     shown = a.distances[:, MOVING_POINTS]
     if not np.isfinite(shown).any():
         axes.text(
             0.5, 0.5, "no obstacle in this run", transform=axes.transAxes, ha="center", color=GREY
         )
         return _finish(figure, axes, a, columns=0)
+    whole = a.scene["law"]["control_points"] != "joints"
     for k in range(5):
         name = f"o{k + 2}" + (" (tip)" if k == 4 else "")
-        _line(axes, a.t, shown[:, k], k, name)
-    low, high = _span(shown)
+        _line(axes, a.t, shown[:, k], k, name, width=0.9 if whole else 1.5)
+    if whole:
+        axes.plot(a.t, a.clearance, color=INK, lw=2.2, label="whole arm")
+    low, high = _span(np.column_stack([shown, a.clearance]))
     if a.rho < high + 0.6 * (high - min(low, a.rho)):
         _level(axes, (a.rho,), f"{RHO} = {a.rho:g} m")
     else:
@@ -236,19 +239,14 @@ def program_times(a: Analysis) -> Figure | None:
 
 
 def compare(runs: Sequence[tuple[str, Analysis]], what: str) -> Figure:
-    """Overlay `deviation` or `distance` (smallest over the moving points) of several runs."""
+    """Overlay `deviation` or `distance` (smallest clearance) of several runs."""
     titles = {
         "deviation": ("Distance of the tip to its goal", "|e| [m]"),
-        "distance": ("Smallest distance of a control point to an obstacle", "d [m]"),
+        "distance": ("Smallest clearance of the arm", "d [m]"),
     }
     figure, axes = _time_axes(*titles[what])
     for k, (label, a) in enumerate(runs):
-        if what == "deviation":
-            values = a.deviation
-        else:
-            moving = a.distances[:, MOVING_POINTS]
-            values = np.where(np.isnan(moving), np.inf, moving).min(axis=1)
-            values[np.isinf(values)] = np.nan
+        values = a.deviation if what == "deviation" else a.clearance
         _line(axes, a.t, values, k, f"{label} ({RHO} = {a.rho:g} m)", width=2.6 if k == 0 else 1.5)
     if what == "deviation":
         axes.set_ylim(bottom=0)
