@@ -232,11 +232,11 @@ static enum lw_status need_of(const struct lw_world *world, const struct lw_obst
     for (int i = 0; i < change->count; i++) {
         const int at = lw_world_find(world, change->obstacle[i].id);
         const struct lw_world_entry *entry = at >= 0 ? &world->entry[at] : NULL;
-        const bool hull = change->obstacle[i].shape == LW_HULL, keeps = hull && change->vertex_count == 0;
+        const bool keeps = change->obstacle[i].shape == LW_HULL && change->vertex_count == 0;
         if (keeps && (entry == NULL || entry->vertex_count == 0))
             return LW_E_UNKNOWN;
         need.obstacles += entry == NULL;
-        need.chunks -= entry != NULL && !keeps ? chunks_of(entry->vertex_count) : 0;
+        need.chunks -= entry != NULL ? chunks_of(entry->vertex_count) : 0; // only a hull told anew needs any
     }
     *out = need;
     return LW_OK;

@@ -1,179 +1,168 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Fuzz target: obstacle messages of several senders merged into one world. After each message the world holds what
-// the rules of collision/world.h say, worked out here obstacle by obstacle from the world before.
+// Fuzz target: obstacle messages of several senders merged into one world, which is empty, or nearly full of obstacles
+// or of vertices. After each message the world holds what the rules of collision/world.h say, worked out by the model
+// of the unit tests; and what is told of it rebuilds it.
 //
-// Units    metres.
+// Units    metres, ns.
 // Frames   base frame.
 // Arrays   see collision/world.h.
 // Memory   static: a world is large.
 // Errors   see fuzz.h.
 #include "collision/world.h"
+#include "controller/tell.h"
 #include "fuzz.h"
-#include "tests/unit/wire_ranges.h" // within
+#include "tests/unit/world_model.h" // model_*
 
 #include <string.h> // memcmp
 
-// More ids and senders than a world has room for.
-enum { IDS = 307, SESSIONS = 40 };
+// Obstacles that are there from the start: ids from here on, of a sender of their own.
+enum { OLD_ID = 1 << 20, OLD_SESSION = 1000, SESSIONS = 5, FULL_HULLS = LW_WORLD_VERTICES / LW_HULL_MAX };
+static struct lw_world world, before, rebuilt, full_of_balls, full_of_hulls;
+
+// --- worlds to begin with ---
+
+static void add_old(struct lw_world *to, int id, int vertices)
+{
+    struct lw_obstacle_change c = {.stamp = {.session = OLD_SESSION, .seq = id}, .count = 1, .vertex_count = vertices};
+    c.obstacle[0] = (struct lw_obstacle){.id = OLD_ID + id, .quat = {1}, .shape = vertices > 0 ? LW_HULL : LW_SPHERE};
+    c.vertex[0] = id;
+    CHECK(lw_world_apply(to, &c) == LW_OK);
+}
+
+static void begin(int kind)
+{
+    if (full_of_balls.count == 0) {
+        for (int id = 1; id <= LW_WORLD_MAX - 12; id++)
+            add_old(&full_of_balls, id, 0);
+        for (int id = 1; id < FULL_HULLS; id++)
+            add_old(&full_of_hulls, id, LW_HULL_MAX);
+    }
+    static const struct lw_world empty;
+    lw_world_copy(kind == 0 ? &full_of_balls : kind == 1 ? &full_of_hulls : &empty, &world);
+}
 
 // --- messages ---
 
-static int64_t newest_of(const struct lw_world *world, int64_t session)
+static int64_t newest_of(int64_t session, int channel)
 {
     for (int i = 0; i < LW_SENDERS_MAX; i++)
-        if (world->sender[i].session == session)
-            return world->sender[i].seq[LW_WORLD_OBSTACLES];
+        if (world.sender[i].session == session && world.sender[i].channel == channel)
+            return world.sender[i].seq;
     return 0;
 }
 
-// A valid message out of six bytes, most often the next one of its sender. Ids step through a prime number of them, so
-// that none stands twice. Obstacles come more often than they go, or the world would never be full.
-static struct lw_obstacle_change next_change(struct bytes *in, const struct lw_world *world)
+// One entry out of a byte; only what its shape has is not 0.
+static struct lw_obstacle next_obstacle(struct bytes *in, int id)
+{
+    const int kind = next_byte(in);
+    struct lw_obstacle o = {.id = id, .shape = (enum lw_shape_kind)(kind % 5), .p = {kind / 5}, .quat = {1}};
+    if (o.shape != LW_HALFSPACE)
+        o.radius = 0.125;
+    for (int i = 0; i < (o.shape == LW_BOX ? 3 : o.shape == LW_CAPSULE ? 1 : 0); i++)
+        o.size[i] = 0.25;
+    return o;
+}
+
+// A valid message out of a few bytes, most often the next one of its sender. Ids step through all of them, so that none
+// stands twice.
+static struct lw_obstacle_change next_change(struct bytes *in)
 {
     static const enum lw_change_op ops[] = {LW_UPSERT, LW_UPSERT,  LW_UPSERT, LW_UPSERT,
                                             LW_UPSERT, LW_REPLACE, LW_REMOVE, LW_CLEAR};
-    struct lw_obstacle_change change = {.stamp = {.session = 1 + next_byte(in) % SESSIONS}};
-    const int op = next_byte(in), seq = next_byte(in), variant = op / 8;
-    change.op = ops[op % 8];
-    change.stamp.seq = seq % 4 != 0 ? newest_of(world, change.stamp.session) + 1 : 1 + seq / 4;
-    change.count = next_byte(in) % (LW_CHANGE_MAX + 1);
-    const int first = next_byte(in), step = 1 + next_byte(in);
-    for (int i = 0; i < change.count; i++)
-        change.obstacle[i] = (struct lw_obstacle){
-            .id = 1 + (first + i * step) % IDS, .p = {variant, i, 0}, .quat = {1}, .radius = variant % 3};
-    return change;
+    struct lw_obstacle_change c = {.stamp = {.session = 1 + next_byte(in) % SESSIONS}};
+    const int op = next_byte(in), seq = next_byte(in), first = next_byte(in), time = next_byte(in);
+    const bool hull = op % 16 == 1;
+    c.op = hull ? LW_UPSERT : ops[op % 8];
+    c.count = hull ? 1 : op / 16;
+    for (int i = 0; i < c.count; i++)
+        c.obstacle[i] = next_obstacle(in, model_id((first + 7 * i) % MODEL_IDS));
+    if (hull) {
+        c.obstacle[0].shape = LW_HULL;
+        c.obstacle[0].radius = 0;
+        memset(c.obstacle[0].size, 0, sizeof c.obstacle[0].size);
+        c.vertex_count = 1 + op / 16 * 4 + seq % 4;
+        c.vertex[0] = first;
+    }
+    c.time_ns = time % 16;
+    c.valid_for_ms = c.time_ns > 0 && time / 128 ? 1 : 0;
+    c.time_ns += c.time_ns > 0 ? time / 16 % 8 * INT64_C(1000000) : 0;
+    const int64_t newest = newest_of(c.stamp.session, (int)lw_change_channel(&c));
+    c.stamp.seq = seq % 8 != 0 ? newest + 1 : 1 + seq / 8;
+    return c;
 }
 
 // --- rules ---
 
-// Obstacles and their owners by id, NULL = none.
-struct table {
-    const struct lw_obstacle *at[IDS + 1];
-    int64_t owner[IDS + 1];
-};
-
-//   owner   in  [count] NULL = session
-static struct table by_id(const struct lw_obstacle *obstacle, const int64_t *owner, int64_t session, int count)
+// Whether there is room for what a change leads to.
+static bool has_room(const struct record *after, int old_count, int old_chunks)
 {
-    struct table table = {0};
-    for (int i = 0; i < count; i++) {
-        CHECK(obstacle[i].id > 0 && obstacle[i].id <= IDS && table.at[obstacle[i].id] == NULL);
-        table.at[obstacle[i].id] = &obstacle[i];
-        table.owner[obstacle[i].id] = owner != NULL ? owner[i] : session;
+    int count = old_count, chunks = old_chunks;
+    for (int id = 0; id < MODEL_IDS; id++) {
+        count += after[id].owner != 0;
+        chunks += (int)(after[id].vertex_count + LW_CHUNK - 1) / LW_CHUNK;
     }
-    return table;
+    return count <= LW_WORLD_MAX && chunks <= LW_WORLD_CHUNKS;
 }
 
-static struct table set_of(const struct lw_world *world)
+static void check_world(const struct record *records, int old_count, int old_chunks, uint64_t old_digest)
 {
-    return by_id(world->obstacle, world->owner, 0, world->count);
+    struct model_sum sum;
+    CHECK(model_matches(&world, records, &sum));
+    CHECK(world.count == old_count + sum.count && world.chunks_used == old_chunks + sum.chunks);
+    CHECK((uint64_t)world.digest == old_digest + sum.digest);
 }
 
-static bool same(const struct lw_obstacle *a, const struct lw_obstacle *b)
-{
-    return a->p[0] == b->p[0] && a->p[1] == b->p[1] && a->p[2] == b->p[2] && a->radius == b->radius;
-}
+// --- telling ---
 
-// Whether what stood under an id before stays there when a change is taken that does not overwrite it.
-static bool stays(const struct lw_obstacle_change *change, int64_t owner, bool is_listed)
+// What is told rebuilds the set: from an empty world, one message after the other.
+static void check_telling(void)
 {
-    switch (change->op) {
-    case LW_UPSERT: return true;
-    case LW_REPLACE: return owner != change->stamp.session;
-    case LW_REMOVE: return !is_listed;
-    case LW_CLEAR: break;
+    static struct lw_tell tell;
+    struct lw_obstacle_change c;
+    static const struct lw_world empty;
+    int64_t seq = 0;
+    lw_world_copy(&empty, &rebuilt);
+    lw_tell_begin(&tell, &world, 0);
+    while (lw_tell_next(&tell, &world, &c)) {
+        c.stamp = (struct lw_stamp){.session = 77, .seq = ++seq}; // one clock judges all: earlier ones first
+        c.valid_for_ms = 0;
+        CHECK(lw_world_apply(&rebuilt, &c) == LW_OK);
     }
-    return false;
-}
-
-// Works out the set that a change leaves, perhaps more than there is room for. Returns the number of obstacles.
-static int expect_all(const struct lw_world *before, const struct lw_obstacle_change *change, struct table *out)
-{
-    const struct table old = set_of(before);
-    const struct table listed = by_id(change->obstacle, NULL, change->stamp.session, change->count);
-    const bool puts = change->op == LW_UPSERT || change->op == LW_REPLACE;
-    int count = 0;
-    for (int id = 1; id <= IDS; id++) {
-        const bool new = puts && listed.at[id] != NULL;
-        const bool kept = !new && old.at[id] != NULL && stays(change, old.owner[id], listed.at[id] != NULL);
-        out->at[id] = new ? listed.at[id] : kept ? old.at[id] : NULL;
-        out->owner[id] = new ? listed.owner[id] : old.owner[id];
-        count += new || kept;
-    }
-    return count;
-}
-
-static void check_set(const struct lw_world *after, const struct table *expected)
-{
-    const struct table found = set_of(after);
-    for (int id = 1; id <= IDS; id++) {
-        CHECK((found.at[id] != NULL) == (expected->at[id] != NULL));
-        if (found.at[id] == NULL)
-            continue;
-        CHECK(same(found.at[id], expected->at[id]));
-        CHECK(found.owner[id] == expected->owner[id]);
-    }
-}
-
-// Whether what is expected is what stood there before.
-static bool is_same_set(const struct lw_world *before, const struct table *expected)
-{
-    const struct table old = set_of(before);
-    for (int id = 1; id <= IDS; id++) {
-        const struct lw_obstacle *a = old.at[id], *b = expected->at[id];
-        if ((a == NULL) != (b == NULL) || (a != NULL && (!same(a, b) || old.owner[id] != expected->owner[id])))
-            return false;
-    }
-    return true;
-}
-
-// The version counts changes of the set; hearing anything at all is version 1.
-static void check_taken(const struct lw_world *before, const struct lw_world *after,
-                        const struct lw_obstacle_change *change, bool is_same)
-{
-    CHECK(newest_of(after, change->stamp.session) == change->stamp.seq);
-    CHECK(after->last.session == change->stamp.session && after->last.seq == change->stamp.seq);
-    CHECK(after->version == before->version + (!is_same || before->version == 0));
-    CHECK(!is_same || before->version == 0 || after->digest == before->digest);
+    CHECK(rebuilt.count == world.count && rebuilt.chunks_used == world.chunks_used);
 }
 
 // --- entry ---
 
-static void apply(struct lw_world *world, const struct lw_obstacle_change *change)
-{
-    static struct lw_world before;
-    struct table expected = {0};
-    memcpy(&before, world, sizeof before);
-    const int64_t newest = newest_of(&before, change->stamp.session);
-    const int count = expect_all(&before, change, &expected);
-    const bool is_old = change->stamp.seq<newest, is_new = change->stamp.seq> newest;
-    const bool is_full = is_new && count > LW_WORLD_MAX;
-    const enum lw_status status = lw_world_apply(world, change);
-    CHECK(status == (is_old ? LW_E_OLD : is_full ? LW_E_FULL : LW_OK));
-    if (status != LW_OK) {
-        // Bytes, because nothing at all may have been touched.
-        CHECK(memcmp((const void *)world, (const void *)&before, sizeof before) == 0);
-    } else if (is_new) {
-        check_set(world, &expected);
-        check_taken(&before, world, change, is_same_set(&before, &expected));
-    } else {
-        CHECK(world->version == before.version && world->count == before.count && world->digest == before.digest);
-    }
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct bytes in = {data, size};
-    static struct lw_world world;
-    memset(&world, 0, sizeof world);
+    static struct record records[MODEL_IDS], after[MODEL_IDS];
+    memset(records, 0, sizeof records);
+    begin(next_byte(&in) % 16);
+    int old_count = world.count, old_chunks = world.chunks_used;
+    uint64_t old_digest = (uint64_t)world.digest;
     while (in.size > 0) {
-        const struct lw_obstacle_change change = next_change(&in, &world);
-        apply(&world, &change);
+        const struct lw_obstacle_change c = next_change(&in);
+        const int64_t newest = newest_of(c.stamp.session, (int)lw_change_channel(&c)), version = world.version;
+        const bool is_new = c.stamp.seq > newest, clears = c.op == LW_CLEAR;
+        memcpy(after, records, sizeof after);
+        model_apply(after, &c);
+        const bool unknown = is_new && model_is_unknown(records, &c);
+        const bool full = is_new && !unknown && !has_room(after, clears ? 0 : old_count, clears ? 0 : old_chunks);
+        const enum lw_status expected = c.stamp.seq < newest ? LW_E_OLD : unknown ? LW_E_UNKNOWN : LW_OK;
+        CHECK(lw_world_apply(&world, &c) == (full ? LW_E_FULL : expected));
+        if (is_new && !unknown && !full) {
+            memcpy(records, after, sizeof records);
+            old_count = clears ? 0 : old_count;
+            old_chunks = clears ? 0 : old_chunks;
+            old_digest = clears ? 0 : old_digest;
+            CHECK(world.last.seq == c.stamp.seq && world.version >= version);
+        } else {
+            CHECK(world.version == version);
+        }
+        check_world(records, old_count, old_chunks, old_digest);
     }
-    for (int i = 0; i < world.count; i++) {
-        double away[3];
-        const double distance = lw_obstacle_distance(&world.obstacle[i], world.obstacle[0].p, away);
-        CHECK(isfinite(distance) && distance >= -world.obstacle[i].radius && within(away, 3, 1));
-    }
+    if (old_count == 0)
+        check_telling();
     return 0;
 }
