@@ -142,7 +142,7 @@ def distances(a: Analysis) -> Figure:
     if low < 0.15 * high:
         axes.axhline(0, color=RED, lw=1)
     axes.plot(a.smallest.t, a.smallest.distance, "o", ms=6, mfc="none", mec=INK, label="smallest")
-    return _finish(figure, axes, a, columns=7)
+    return _finish(figure, axes, a, columns=8)
 
 
 def limit_use(a: Analysis) -> Figure:
