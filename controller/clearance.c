@@ -11,8 +11,10 @@
 #include "arm/joint.h" // enum lw_flag
 #include "base/vec.h"  // lw_vec_dot
 
-#include <math.h> // fmax, sqrt
+#include <math.h>   // fmax, sqrt
+#include <string.h> // memcpy
 
+enum { SWEEPS = 10 };
 static const double rounding = 1e-9; // a wish scaled to its part need not come out as wholly allowed
 
 // Time to come to rest along a straight line in joint space.
@@ -59,6 +61,14 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
     }
 }
 
+static double closing_speed(const struct lw_room *room, const double velocity[LW_NJ])
+{
+    double closing = 0;
+    for (int j = 0; j < LW_NJ; j++)
+        closing -= room->gradient[j] * velocity[j];
+    return closing;
+}
+
 // Part of a velocity that one room allows.
 //   time  in  s, braking time of the whole velocity
 static double part_of(const struct lw_room *room, double closing, double time, double period_s)
@@ -77,13 +87,40 @@ double lw_clearance_part(const struct lw_limits *limits, double period_s, const 
     const double time = braking_time(limits, velocity);
     double part = 1;
     for (int i = 0; i < rooms->count; i++) {
-        double closing = 0;
-        for (int j = 0; j < LW_NJ; j++)
-            closing -= rooms->room[i].gradient[j] * velocity[j];
+        const double closing = closing_speed(&rooms->room[i], velocity);
         if (closing > 0)
             part = fmin(part, part_of(&rooms->room[i], closing, time, period_s));
     }
     return part;
+}
+
+// Takes out of a wish what closes in too fast, room by room, and leaves what goes along: the arm slides past an
+// obstacle instead of standing before it. Several rooms in turn come close to the nearest allowed wish; what they leave
+// over is for the scaling. Returns whether anything was taken.
+static bool slide(const struct lw_guard_input *in, const struct lw_rooms *rooms, double wish[LW_NJ])
+{
+    bool changed = false;
+    const double time = braking_time(in->limits, wish);
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        bool fits = true;
+        for (int i = 0; i < rooms->count; i++) {
+            const struct lw_room *room = &rooms->room[i];
+            const double left = room->room - room->approach * (time + in->period_s);
+            const double excess = closing_speed(room, wish) - fmax(left, 0) / (time / 2 + in->period_s);
+            double square = 0;
+            for (int j = 0; j < LW_NJ; j++)
+                square += room->gradient[j] * room->gradient[j];
+            if (excess <= 0 || square == 0)
+                continue;
+            fits = false;
+            for (int j = 0; j < LW_NJ; j++)
+                wish[j] += excess / square * room->gradient[j];
+        }
+        if (fits)
+            return changed;
+        changed = true;
+    }
+    return changed;
 }
 
 unsigned lw_clearance_command(const struct lw_guard_input *in, const struct lw_rooms *rooms, double command[LW_NJ])
@@ -91,12 +128,17 @@ unsigned lw_clearance_command(const struct lw_guard_input *in, const struct lw_r
     static const double rest[LW_NJ] = {0};
     struct lw_guard_input scaled = *in;
     double wish[LW_NJ];
-    const bool finite = lw_all_finite(in->wish, LW_NJ);
-    const double part = finite ? lw_clearance_part(in->limits, in->period_s, rooms, in->wish) : 1;
-    for (int j = 0; j < LW_NJ; j++)
-        wish[j] = part < 1 ? part * in->wish[j] : in->wish[j];
+    memcpy(wish, in->wish, sizeof wish);
     scaled.wish = wish;
-    const unsigned flags = lw_guard_shape(&scaled, command) | (part < 1 ? LW_LIMIT_CLEARANCE : 0u);
+    unsigned flags = 0;
+    if (rooms->count > 0 && lw_all_finite(wish, LW_NJ)) {
+        const bool slid = slide(in, rooms, wish);
+        const double part = lw_clearance_part(in->limits, in->period_s, rooms, wish);
+        for (int j = 0; part < 1 && j < LW_NJ; j++)
+            wish[j] *= part;
+        flags = slid || part < 1 ? LW_LIMIT_CLEARANCE : 0u;
+    }
+    flags |= lw_guard_shape(&scaled, command);
     if (rooms->count == 0 || lw_clearance_part(in->limits, in->period_s, rooms, command) > 1 - rounding)
         return flags;
     scaled.wish = rest;

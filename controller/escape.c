@@ -15,10 +15,12 @@
 #include <math.h>   // fmin, HUGE_VAL
 #include <string.h> // memcpy
 
-enum { CANDIDATES = 5, STEPS = 375 };
+enum { CIRCULATIONS = 4, DETOURS = 6, CANDIDATES = 1 + CIRCULATIONS + DETOURS, STEPS = 500 };
 static const int64_t step_ns = 8 * 1000 * 1000;
 static const int64_t share_ns = 125 * 1000; // of the tick's period for one step: a roll-out takes a quarter of a second
-static const double worth_m = 0.02;         // a direction has to bring the tip this much nearer
+static const double detour_m = 0.2;         // later attempts two and three times as far
+static const int64_t detour_ns = 1500 * INT64_C(1000000);
+static const double worth_m = 0.02;             // a direction has to bring the tip this much nearer
 static const int64_t patience_ns = LW_NS_PER_S; // after an attempt, doubled with each one ...
 enum { PATIENCE_DOUBLINGS = 3 };
 static const int64_t progress_ns = 5 * LW_NS_PER_S; // without coming nearer for this long it goes in circles
@@ -38,17 +40,29 @@ void lw_escape_pause(struct lw_escape *escape)
     escape->nearest_ns = 0;
 }
 
-// Direction to try: none, to either side of the way to the goal, over or under it.
-static void candidate_circulation(int candidate, double strength, const struct lw_escape_now *now, double out[3])
+const double *lw_escape_target(const struct lw_escape *escape, const double goal[3], int64_t time_ns)
+{
+    return time_ns < escape->by_until_ns ? escape->by : goal;
+}
+
+// The ways to try: on as it is; around obstacles to either side of the way to the goal, over or under them; by a point
+// to either side, above, below, or back.
+static struct lw_way_out candidate_way(int candidate, double strength, double detour, const struct lw_escape_now *now)
 {
     const double way[2] = {now->goal[0] - now->tip[0], now->goal[1] - now->tip[1]};
     const double length = hypot(way[0], way[1]);
-    const double across[3] = {length > 0 ? -way[1] / length : 1, length > 0 ? way[0] / length : 0, 0};
-    const double up[3] = {0, 0, 1};
-    const double *axis = candidate <= 2 ? up : across;
-    const double sign = candidate == 0 ? 0 : candidate % 2 == 1 ? -1 : 1;
-    for (int i = 0; i < 3; i++)
-        out[i] = sign * strength * axis[i];
+    const double ahead[3] = {length > 0 ? way[0] / length : 0, length > 0 ? way[1] / length : 1, 0};
+    const double across[3] = {-ahead[1], ahead[0], 0}, up[3] = {0, 0, 1};
+    const double *const axes[] = {up, across}, *const sides[] = {across, up, ahead};
+    const double sign = candidate % 2 == 1 ? -1 : 1;
+    struct lw_way_out out = {{0}, {0}};
+    if (candidate == 0)
+        return out;
+    if (candidate <= CIRCULATIONS)
+        lw_vec_add_scaled(sign * strength, axes[(candidate - 1) / 2], out.circulation);
+    else
+        lw_vec_add_scaled(sign * detour, sides[(candidate - CIRCULATIONS - 1) / 2], out.detour);
+    return out;
 }
 
 // Starts a candidate from where the arm was.
@@ -60,9 +74,9 @@ static void begin(struct lw_escape *escape, int candidate, const struct lw_remed
     rollout->steps = 0;
     memcpy(rollout->q, rollout->from_q, sizeof rollout->q);
     memcpy(rollout->velocity, rollout->from_velocity, sizeof rollout->velocity);
-    // Later attempts turn harder.
-    const double strength = params->circulation * (1 + escape->attempts % 3);
-    candidate_circulation(candidate, strength, now, rollout->circulation);
+    // Later attempts turn harder and go farther.
+    const double more = 1 + escape->attempts % 3;
+    rollout->way = candidate_way(candidate, params->circulation * more, detour_m * more, now);
 }
 
 // One step of law, guard and plant. Returns the deviation before it, infinite when the arm is nowhere.
@@ -84,8 +98,14 @@ static double roll(struct lw_rollout *rollout, const struct lw_escape_model *mod
                                  .reach = fmax(reach.obstacles, brake.obstacles),
                                  .self_reach = fmax(reach.self, brake.self)};
     lw_surroundings_look(&eyes, &around);
-    const struct lw_law_input in = {
-        .around = &around, .body = model->body, .goal = now->goal, .circulation = rollout->circulation};
+    double by[3];
+    memcpy(by, rollout->from_tip, sizeof by);
+    lw_vec_add_scaled(1, rollout->way.detour, by);
+    const bool detours = lw_vec_norm(rollout->way.detour) > 0 && rollout->steps * step_ns < detour_ns;
+    const struct lw_law_input in = {.around = &around,
+                                    .body = model->body,
+                                    .goal = detours ? by : now->goal,
+                                    .circulation = rollout->way.circulation};
     model->law->step(model->params, &in, wish);
     lw_clearance_rooms(model->limits, brake, model->body, &around, &rooms);
     (void)lw_clearance_command(&guard, &rooms, command);
@@ -106,7 +126,10 @@ static void decide(struct lw_escape *escape, const struct lw_escape_now *now)
     escape->attempts++;
     if (rollout->best > now->deviation - worth_m)
         return;
-    memcpy(escape->circulation, rollout->best_circulation, sizeof escape->circulation);
+    memcpy(escape->circulation, rollout->best_way.circulation, sizeof escape->circulation);
+    memcpy(escape->by, rollout->from_tip, sizeof escape->by);
+    lw_vec_add_scaled(1, rollout->best_way.detour, escape->by);
+    escape->by_until_ns = lw_vec_norm(rollout->best_way.detour) > 0 ? now->tick.time_ns + detour_ns : 0;
     lw_stuck_reset(&escape->stuck);
     escape->nearest = now->deviation;
     escape->nearest_ns = now->tick.time_ns;
@@ -122,7 +145,7 @@ static void roll_on(struct lw_escape *escape, const struct lw_escape_model *mode
             continue;
         if (deviation < rollout->best) {
             rollout->best = deviation;
-            memcpy(rollout->best_circulation, rollout->circulation, sizeof rollout->best_circulation);
+            rollout->best_way = rollout->way;
         }
         if (rollout->candidate + 1 < CANDIDATES)
             begin(escape, rollout->candidate + 1, &model->params->remedy, now);
@@ -155,6 +178,7 @@ bool lw_escape_step(struct lw_escape *escape, const struct lw_escape_model *mode
         rollout->from_ns = now->tick.time_ns;
         rollout->best = HUGE_VAL;
         memcpy(rollout->from_q, now->q, sizeof rollout->from_q);
+        memcpy(rollout->from_tip, now->tip, sizeof rollout->from_tip);
         memcpy(rollout->from_velocity, now->velocity, sizeof rollout->from_velocity);
         begin(escape, 0, &model->params->remedy, now);
     }

@@ -36,6 +36,12 @@ struct lw_escape_now {
     struct lw_stuck_tick tick;
 };
 
+// A way out to try: turning around obstacles, or going by a point beside the way first.
+struct lw_way_out {
+    double circulation[3]; // axis times strength
+    double detour[3];      // m, from the tip where it was stuck to the point to go by; zero = none
+};
+
 // A roll-out in progress.
 struct lw_rollout {
     int candidate; // direction tried, -1 = none in progress
@@ -43,14 +49,17 @@ struct lw_rollout {
     int64_t from_ns;
     double from_q[LW_NJ], from_velocity[LW_NJ]; // where all candidates start
     double q[LW_NJ], velocity[LW_NJ];           // where this one is
-    double circulation[3];                      // of this candidate
+    double from_tip[3];                         // m
+    struct lw_way_out way;                      // of this candidate
     double best;                                // m, deviation at the end of the best candidate so far
-    double best_circulation[3];
+    struct lw_way_out best_way;
 };
 
 struct lw_escape {
     struct lw_stuck stuck;
     double circulation[3]; // in force
+    double by[3];          // m, point to go by, and until when; by_until_ns 0 = none
+    int64_t by_until_ns;
     int attempts;          // decisions for this goal so far
     int64_t wait_until_ns; // no roll-out begins before
     double nearest;        // m, smallest deviation since the last decision
@@ -63,6 +72,9 @@ void lw_escape_reset(struct lw_escape *escape, const struct lw_remedy_params *pa
 
 // The arm is braked: it stands for another reason. The circulation found stays.
 void lw_escape_pause(struct lw_escape *escape);
+
+// Where the tip is sent at a time: to the goal, or to the point to go by.
+const double *lw_escape_target(const struct lw_escape *escape, const double goal[3], int64_t time_ns);
 
 // One tick: notes the deviation, rolls out, decides. The circulation in force afterwards is escape->circulation.
 // Returns whether the tip is stuck. Cost: law and guard once for every 125 us of the period, nothing while it moves on.

@@ -148,11 +148,13 @@ static unsigned brake_reasons(const struct lw_controller *config, const struct l
     return flags;
 }
 
-static void ask_law(const struct lw_controller *config, const struct lw_controller_state *state,
+static void ask_law(const struct lw_controller *config, const struct lw_controller_state *state, int64_t time_ns,
                     const struct lw_surroundings *around, struct lw_joint_command *out)
 {
-    const struct lw_law_input in = {
-        .around = around, .body = &config->body, .goal = state->request.goal, .circulation = state->escape.circulation};
+    const struct lw_law_input in = {.around = around,
+                                    .body = &config->body,
+                                    .goal = lw_escape_target(&state->escape, state->request.goal, time_ns),
+                                    .circulation = state->escape.circulation};
     config->law->step(&config->params, &in, out->qd_law);
     out->law_outcome = lw_all_finite(out->qd_law, LW_NJ) ? LW_LAW_OK : LW_LAW_NO_NUMBER;
     memcpy(out->circulation, state->escape.circulation, sizeof out->circulation);
@@ -218,7 +220,7 @@ void lw_tick(const struct lw_controller *config, struct lw_controller_state *sta
     const bool seen = look(config, state, in, &around, &brake);
     if (seen) {
         out->flags |= is_contact(config, &around) ? LW_CONTACT : 0u;
-        ask_law(config, state, &around, out);
+        ask_law(config, state, in->time_ns, &around, out);
         lw_explain_clearance(config, state, in, &around, out);
     }
     if (seen && out->flags == 0)
