@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// flood RATE: full OBSTACLES messages on the channel FLOOD, which nobody wants, at a rate, until a signal. Every
-// 100 ms it prints one line: CLOCK_MONOTONIC in ns, and how many it has sent.
+// flood RATE [CHANNEL]: full OBSTACLES messages at a rate, until a signal; on the channel FLOOD, which nobody wants, or
+// on another, where each is a new change of the world. Every 100 ms it prints one line: CLOCK_MONOTONIC in ns, and how
+// many it has sent.
 //
 // Units    ns.
 // Frames   none.
@@ -16,6 +17,7 @@
 #include <stdbool.h>  // bool
 #include <stdio.h>    // printf
 #include <stdlib.h>   // strtod
+#include <string.h>   // memcpy
 
 // Small batches: a big one would stop the world for as long as it takes. What it falls behind by more than
 // BACKLOG_NS is given up, so that it never makes up for seconds at a higher rate.
@@ -25,6 +27,7 @@ struct flood {
     lcm_t *lcm;
     unsigned char message[LW_WIRE_MAX];
     uint32_t size;
+    const char *channel;
     double rate;
     int64_t sent;
 };
@@ -35,16 +38,27 @@ static void fill(struct flood *flood)
     union lw_message message = {.obstacles = {.op = LW_UPSERT, .count = LW_CHANGE_MAX}};
     message.stamp = (struct lw_stamp){.utime = lw_clock_utime(), .session = lw_clock_session(), .seq = 1};
     for (int i = 0; i < LW_CHANGE_MAX; i++)
-        message.obstacles.obstacle[i] = (struct lw_obstacle){.id = i + 1, .p = {1, 2, 3}, .quat = {1}, .radius = 0.1};
+        message.obstacles.obstacle[i] = (struct lw_obstacle){.id = i + 1, .p = {20, 2, 3}, .quat = {1}, .radius = 0.1};
     flood->size = lw_wire_encode(LW_CHANNEL_OBSTACLES, &message, flood->message);
+}
+
+// The number in the header, and the last bits of a place: no message is a repetition.
+static void count(struct flood *flood)
+{
+    enum { PLACE_OF_SEQ = 8 + 3 * 8, PLACE_OF_P = 70 };
+    for (int i = 0; i < 8; i++)
+        flood->message[PLACE_OF_SEQ + i] = (unsigned char)((flood->sent + 1) >> (8 * (7 - i)));
+    memcpy(flood->message + PLACE_OF_P + 4, flood->message + PLACE_OF_SEQ + 4, 4);
 }
 
 // Sends what is due. False when the bus refuses.
 static bool send_until(struct flood *flood, int64_t due)
 {
-    for (; flood->sent < due; flood->sent++)
-        if (lcm_publish(flood->lcm, "FLOOD", flood->message, flood->size) != 0)
+    for (; flood->sent < due; flood->sent++) {
+        count(flood);
+        if (lcm_publish(flood->lcm, flood->channel, flood->message, flood->size) != 0)
             return false;
+    }
     return true;
 }
 
@@ -75,9 +89,10 @@ static bool run(struct flood *flood)
 int main(int argc, char **argv)
 {
     static struct flood flood;
-    flood.rate = argc == 2 ? strtod(argv[1], NULL) : 0;
+    flood.rate = argc == 2 || argc == 3 ? strtod(argv[1], NULL) : 0;
+    flood.channel = argc == 3 ? argv[2] : "FLOOD";
     if (!(flood.rate >= 1 && flood.rate <= 1e7)) {
-        fprintf(stderr, "usage: flood MESSAGES_PER_SECOND\n");
+        fprintf(stderr, "usage: flood MESSAGES_PER_SECOND [CHANNEL]\n");
         return 2;
     }
     lw_stop_install();
