@@ -17,7 +17,7 @@
 
 // Obstacles that are there from the start: ids from here on, of a sender of their own.
 enum { OLD_ID = 1 << 20, OLD_SESSION = 1000, SESSIONS = 5, FULL_HULLS = LW_WORLD_VERTICES / LW_HULL_MAX };
-static struct lw_world world, before, rebuilt, full_of_balls, full_of_hulls;
+static struct lw_world world, rebuilt, full_of_balls, full_of_hulls;
 
 // --- worlds to begin with ---
 
@@ -104,14 +104,6 @@ static bool has_room(const struct record *after, int old_count, int old_chunks)
     return count <= LW_WORLD_MAX && chunks <= LW_WORLD_CHUNKS;
 }
 
-static void check_world(const struct record *records, int old_count, int old_chunks, uint64_t old_digest)
-{
-    struct model_sum sum;
-    CHECK(model_matches(&world, records, &sum));
-    CHECK(world.count == old_count + sum.count && world.chunks_used == old_chunks + sum.chunks);
-    CHECK((uint64_t)world.digest == old_digest + sum.digest);
-}
-
 // --- telling ---
 
 // What is told rebuilds the set: from an empty world, one message after the other.
@@ -133,36 +125,65 @@ static void check_telling(void)
 
 // --- entry ---
 
+// What the world holds beside what the records say.
+struct old {
+    int count, chunks;
+    uint64_t digest;
+};
+
+static void check_world(const struct record *records, const struct old *old)
+{
+    struct model_sum sum;
+    CHECK(model_matches(&world, records, &sum));
+    CHECK(world.count == old->count + sum.count && world.chunks_used == old->chunks + sum.chunks);
+    CHECK((uint64_t)world.digest == old->digest + sum.digest);
+}
+
+// What has to come of a change; `after` is what it would lead to, `left` what it would leave of the old.
+static enum lw_status expect(struct record *records, const struct record *after, const struct old *left,
+                             const struct lw_obstacle_change *c)
+{
+    const int64_t newest = newest_of(c->stamp.session, (int)lw_change_channel(c));
+    if (c->stamp.seq <= newest)
+        return c->stamp.seq < newest ? LW_E_OLD : LW_OK;
+    if (model_is_unknown(records, c))
+        return LW_E_UNKNOWN;
+    return has_room(after, left->count, left->chunks) ? LW_OK : LW_E_FULL;
+}
+
+// Applies a change to world and records, and compares them.
+static void apply(struct record *records, struct old *old, const struct lw_obstacle_change *c)
+{
+    static struct record after[MODEL_IDS];
+    const struct old left = c->op == LW_CLEAR ? (struct old){0} : *old;
+    const bool is_new = c->stamp.seq > newest_of(c->stamp.session, (int)lw_change_channel(c));
+    const int64_t version = world.version;
+    memcpy(after, records, sizeof after);
+    model_apply(after, c);
+    const enum lw_status expected = expect(records, after, &left, c);
+    CHECK(lw_world_apply(&world, c) == expected);
+    if (expected == LW_OK && is_new) {
+        memcpy(records, after, sizeof after);
+        *old = left;
+        CHECK(world.last.seq == c->stamp.seq && world.version >= version);
+    } else {
+        CHECK(world.version == version);
+    }
+    check_world(records, old);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     struct bytes in = {data, size};
-    static struct record records[MODEL_IDS], after[MODEL_IDS];
+    static struct record records[MODEL_IDS];
     memset(records, 0, sizeof records);
     begin(next_byte(&in) % 16);
-    int old_count = world.count, old_chunks = world.chunks_used;
-    uint64_t old_digest = (uint64_t)world.digest;
+    struct old old = {world.count, world.chunks_used, (uint64_t)world.digest};
     while (in.size > 0) {
         const struct lw_obstacle_change c = next_change(&in);
-        const int64_t newest = newest_of(c.stamp.session, (int)lw_change_channel(&c)), version = world.version;
-        const bool is_new = c.stamp.seq > newest, clears = c.op == LW_CLEAR;
-        memcpy(after, records, sizeof after);
-        model_apply(after, &c);
-        const bool unknown = is_new && model_is_unknown(records, &c);
-        const bool full = is_new && !unknown && !has_room(after, clears ? 0 : old_count, clears ? 0 : old_chunks);
-        const enum lw_status expected = c.stamp.seq < newest ? LW_E_OLD : unknown ? LW_E_UNKNOWN : LW_OK;
-        CHECK(lw_world_apply(&world, &c) == (full ? LW_E_FULL : expected));
-        if (is_new && !unknown && !full) {
-            memcpy(records, after, sizeof records);
-            old_count = clears ? 0 : old_count;
-            old_chunks = clears ? 0 : old_chunks;
-            old_digest = clears ? 0 : old_digest;
-            CHECK(world.last.seq == c.stamp.seq && world.version >= version);
-        } else {
-            CHECK(world.version == version);
-        }
-        check_world(records, old_count, old_chunks, old_digest);
+        apply(records, &old, &c);
     }
-    if (old_count == 0)
+    if (old.count == 0)
         check_telling();
     return 0;
 }
