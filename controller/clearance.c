@@ -14,7 +14,7 @@
 #include <math.h>   // fmax, sqrt
 #include <string.h> // memcpy
 
-enum { SWEEPS = 10 };
+enum { SWEEPS = 10, HALVINGS = 30 };
 static const double rounding = 1e-9; // a wish scaled to its part need not come out as wholly allowed
 
 // Time to come to rest along a straight line in joint space.
@@ -39,7 +39,11 @@ struct lw_law_reach lw_clearance_reach(const struct lw_guard_input *in, const st
         faster += fmax(next[j] - fabs(in->velocity[j]), 0) * body->lever[j];
     }
     const double time = braking_time(limits, next);
-    const double way = (lw_surroundings_speed(s, body, in->velocity) + faster) * (time / 2 + in->period_s);
+    const double speed = lw_surroundings_speed(s, body, in->velocity) + faster;
+    double turning = 0;
+    for (int j = 0; j < LW_NJ; j++)
+        turning += next[j];
+    const double way = speed * (time / 2 + in->period_s) + turning * speed * time * time / 4;
     const double coming = obstacle_speed * (time + in->period_s);
     return (struct lw_law_reach){.obstacles = limits->clearance + way + coming, .self = limits->clearance + 2 * way};
 }
@@ -48,6 +52,8 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
                         const struct lw_surroundings *s, struct lw_rooms *rooms)
 {
     rooms->count = 0;
+    rooms->around = s;
+    rooms->body = body;
     if (isinf(limits->clearance))
         return;
     for (int i = 0; i < s->near.count; i++) {
@@ -69,27 +75,61 @@ static double closing_speed(const struct lw_room *room, const double velocity[LW
     return closing;
 }
 
-// Part of a velocity that one room allows.
-//   time  in  s, braking time of the whole velocity
-static double part_of(const struct lw_room *room, double closing, double time, double period_s)
+// How far points leave their straight way until they rest.
+static double curve(const struct lw_rooms *rooms, const double velocity[LW_NJ], double time)
 {
-    const double left = room->room - room->approach * (time + period_s);
-    if (left <= 0)
+    double turning = 0;
+    if (rooms->around == NULL)
         return 0;
-    // The larger root of closing (part time / 2 + period) part = left.
-    const double at_once = closing * period_s;
-    return fmin(1, 2 * left / (at_once + sqrt(at_once * at_once + 2 * closing * time * left)));
+    for (int j = 0; j < LW_NJ; j++)
+        turning += fabs(velocity[j]);
+    return turning * lw_surroundings_speed(rooms->around, rooms->body, velocity) * time * time / 4;
+}
+
+// What a part of a velocity needs of a room.
+static double need(double part, double closing, double time, double period_s, double curve)
+{
+    const double square = part * part;
+    return closing * part * (part * time / 2 + period_s) + curve * square * square;
+}
+
+// Part of a velocity that one room allows.
+//   time   in  s, braking time of the whole velocity
+//   curve  in  m, of the whole velocity
+static double part_of(const struct lw_room *room, double closing, double time, double period_s, double curve)
+{
+    const double left = room->room - room->approach * (time + period_s), rate = fmax(closing, 0);
+    if (left <= 0)
+        return closing > 0 ? 0 : 1;
+    if (need(1, rate, time, period_s, curve) <= left)
+        return 1;
+    // Without the curve it is the larger root of a square; with it the way there is halved until nothing changes.
+    if (curve == 0) {
+        const double at_once = rate * period_s;
+        return 2 * left / (at_once + sqrt(at_once * at_once + 2 * rate * time * left));
+    }
+    double low = 0, high = 1;
+    for (int i = 0; i < HALVINGS; i++) {
+        const double middle = (low + high) / 2;
+        if (need(middle, rate, time, period_s, curve) <= left)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
 }
 
 double lw_clearance_part(const struct lw_limits *limits, double period_s, const struct lw_rooms *rooms,
                          const double velocity[LW_NJ])
 {
-    const double time = braking_time(limits, velocity);
+    if (rooms->count == 0)
+        return 1;
+    const double time = braking_time(limits, velocity), bend = curve(rooms, velocity, time);
     double part = 1;
     for (int i = 0; i < rooms->count; i++) {
         const double closing = closing_speed(&rooms->room[i], velocity);
-        if (closing > 0)
-            part = fmin(part, part_of(&rooms->room[i], closing, time, period_s));
+        if (closing > 0 || bend > 0)
+            part = fmin(part, part_of(&rooms->room[i], closing, time, period_s, bend));
     }
     return part;
 }

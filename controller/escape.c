@@ -9,19 +9,20 @@
 #include "controller/escape.h"
 
 #include "base/clock.h"           // LW_NS_PER_S
+#include "base/digest.h"          // lw_digest_word
 #include "base/vec.h"             // lw_vec_*
 #include "controller/clearance.h" // lw_clearance_command
 
 #include <math.h>   // fmin, HUGE_VAL
 #include <string.h> // memcpy
 
-enum { CIRCULATIONS = 4, DETOURS = 6, CANDIDATES = 1 + CIRCULATIONS + DETOURS, STEPS = 500 };
+enum { CIRCULATIONS = 4, ASIDES = 12, CANDIDATES = 1 + CIRCULATIONS + ASIDES, STEPS = 625 };
 static const int64_t step_ns = 8 * 1000 * 1000;
-static const int64_t share_ns = 125 * 1000; // of the tick's period for one step: a roll-out takes a quarter of a second
-static const double detour_m = 0.2;         // later attempts two and three times as far
-static const int64_t detour_ns = 1500 * INT64_C(1000000);
-static const double worth_m = 0.02;             // a direction has to bring the tip this much nearer
-static const int64_t patience_ns = LW_NS_PER_S; // after an attempt, doubled with each one ...
+static const int64_t share_ns = 50 * 1000; // of the tick's period for one step: a roll-out takes half a second
+static const double aside_speed = 1.0;     // rad/s
+static const int64_t aside_ns = 1500 * INT64_C(1000000);
+static const double worth_m = 0.02;                 // a way has to bring the tip this much nearer
+static const int64_t patience_ns = LW_NS_PER_S / 4; // after an attempt, doubled with each one ...
 enum { PATIENCE_DOUBLINGS = 3 };
 static const int64_t progress_ns = 5 * LW_NS_PER_S; // without coming nearer for this long it goes in circles
 
@@ -38,30 +39,37 @@ void lw_escape_pause(struct lw_escape *escape)
     lw_stuck_reset(&escape->stuck);
     escape->rollout.candidate = -1;
     escape->nearest_ns = 0;
+    escape->aside_until_ns = 0;
 }
 
-const double *lw_escape_target(const struct lw_escape *escape, const double goal[3], int64_t time_ns)
+const double *lw_escape_aside(const struct lw_escape *escape, int64_t time_ns)
 {
-    return time_ns < escape->by_until_ns ? escape->by : goal;
+    return time_ns < escape->aside_until_ns ? escape->aside : NULL;
 }
 
-// The ways to try: on as it is; around obstacles to either side of the way to the goal, over or under them; by a point
-// to either side, above, below, or back.
-static struct lw_way_out candidate_way(int candidate, double strength, double detour, const struct lw_escape_now *now)
+// A number in [-1, 1) that depends on its arguments alone.
+static double scatter(uint64_t attempt, uint64_t candidate, uint64_t joint)
+{
+    uint64_t x = lw_digest_word(lw_digest_word(lw_digest_word(LW_DIGEST_START, attempt), candidate), joint);
+    x = lw_digest_word(x ^ (x >> 29), joint);
+    return (double)(x >> 11) * 0x1p-52 - 1;
+}
+
+// The ways to try: on as it is; around obstacles to either side of the way to the goal, over or under them; aside in
+// any direction of the joints, others in each attempt.
+static struct lw_way_out candidate_way(int candidate, int attempt, double strength, const struct lw_escape_now *now)
 {
     const double way[2] = {now->goal[0] - now->tip[0], now->goal[1] - now->tip[1]};
     const double length = hypot(way[0], way[1]);
-    const double ahead[3] = {length > 0 ? way[0] / length : 0, length > 0 ? way[1] / length : 1, 0};
-    const double across[3] = {-ahead[1], ahead[0], 0}, up[3] = {0, 0, 1};
-    const double *const axes[] = {up, across}, *const sides[] = {across, up, ahead};
-    const double sign = candidate % 2 == 1 ? -1 : 1;
-    struct lw_way_out out = {{0}, {0}};
-    if (candidate == 0)
-        return out;
-    if (candidate <= CIRCULATIONS)
-        lw_vec_add_scaled(sign * strength, axes[(candidate - 1) / 2], out.circulation);
-    else
-        lw_vec_add_scaled(sign * detour, sides[(candidate - CIRCULATIONS - 1) / 2], out.detour);
+    const double across[3] = {length > 0 ? -way[1] / length : 1, length > 0 ? way[0] / length : 0, 0};
+    const double up[3] = {0, 0, 1};
+    struct lw_way_out out = {.moves_aside = false};
+    out.moves_aside = candidate > CIRCULATIONS;
+    if (out.moves_aside)
+        for (int j = 0; j < LW_NJ; j++)
+            out.aside[j] = aside_speed * scatter((uint64_t)attempt, (uint64_t)candidate, (uint64_t)j);
+    else if (candidate > 0)
+        lw_vec_add_scaled(candidate % 2 == 1 ? -strength : strength, candidate <= 2 ? up : across, out.circulation);
     return out;
 }
 
@@ -74,9 +82,9 @@ static void begin(struct lw_escape *escape, int candidate, const struct lw_remed
     rollout->steps = 0;
     memcpy(rollout->q, rollout->from_q, sizeof rollout->q);
     memcpy(rollout->velocity, rollout->from_velocity, sizeof rollout->velocity);
-    // Later attempts turn harder and go farther.
-    const double more = 1 + escape->attempts % 3;
-    rollout->way = candidate_way(candidate, params->circulation * more, detour_m * more, now);
+    // Later attempts turn harder.
+    const double strength = params->circulation * (1 + escape->attempts % 3);
+    rollout->way = candidate_way(candidate, escape->attempts, strength, now);
 }
 
 // One step of law, guard and plant. Returns the deviation before it, infinite when the arm is nowhere.
@@ -98,21 +106,21 @@ static double roll(struct lw_rollout *rollout, const struct lw_escape_model *mod
                                  .reach = fmax(reach.obstacles, brake.obstacles),
                                  .self_reach = fmax(reach.self, brake.self)};
     lw_surroundings_look(&eyes, &around);
-    double by[3];
-    memcpy(by, rollout->from_tip, sizeof by);
-    lw_vec_add_scaled(1, rollout->way.detour, by);
-    const bool detours = lw_vec_norm(rollout->way.detour) > 0 && rollout->steps * step_ns < detour_ns;
+    const bool aside = rollout->way.moves_aside && rollout->steps * step_ns < aside_ns;
+    const double *tip = around.frame[LW_NJ - 1].p;
     const struct lw_law_input in = {.around = &around,
                                     .body = model->body,
-                                    .goal = detours ? by : now->goal,
+                                    .goal = aside ? tip : now->goal,
                                     .circulation = rollout->way.circulation};
     model->law->step(model->params, &in, wish);
+    for (int j = 0; aside && j < LW_NJ; j++)
+        wish[j] += rollout->way.aside[j];
     lw_clearance_rooms(model->limits, brake, model->body, &around, &rooms);
     (void)lw_clearance_command(&guard, &rooms, command);
     for (int j = 0; j < LW_NJ; j++)
         rollout->q[j] += period_s * command[j];
     memcpy(rollout->velocity, command, sizeof command);
-    lw_vec_sub(now->goal, around.frame[LW_NJ - 1].p, to_goal);
+    lw_vec_sub(now->goal, tip, to_goal);
     return lw_vec_norm(to_goal);
 }
 
@@ -127,9 +135,8 @@ static void decide(struct lw_escape *escape, const struct lw_escape_now *now)
     if (rollout->best > now->deviation - worth_m)
         return;
     memcpy(escape->circulation, rollout->best_way.circulation, sizeof escape->circulation);
-    memcpy(escape->by, rollout->from_tip, sizeof escape->by);
-    lw_vec_add_scaled(1, rollout->best_way.detour, escape->by);
-    escape->by_until_ns = lw_vec_norm(rollout->best_way.detour) > 0 ? now->tick.time_ns + detour_ns : 0;
+    memcpy(escape->aside, rollout->best_way.aside, sizeof escape->aside);
+    escape->aside_until_ns = rollout->best_way.moves_aside ? now->tick.time_ns + aside_ns : 0;
     lw_stuck_reset(&escape->stuck);
     escape->nearest = now->deviation;
     escape->nearest_ns = now->tick.time_ns;
@@ -143,8 +150,10 @@ static void roll_on(struct lw_escape *escape, const struct lw_escape_model *mode
         const double deviation = roll(rollout, model, now);
         if (++rollout->steps < STEPS)
             continue;
-        if (deviation < rollout->best) {
-            rollout->best = deviation;
+        // Another way has to be worth leaving this one.
+        const double score = rollout->candidate == 0 ? deviation - worth_m : deviation;
+        if (score < rollout->best) {
+            rollout->best = score;
             rollout->best_way = rollout->way;
         }
         if (rollout->candidate + 1 < CANDIDATES)
@@ -178,7 +187,6 @@ bool lw_escape_step(struct lw_escape *escape, const struct lw_escape_model *mode
         rollout->from_ns = now->tick.time_ns;
         rollout->best = HUGE_VAL;
         memcpy(rollout->from_q, now->q, sizeof rollout->from_q);
-        memcpy(rollout->from_tip, now->tip, sizeof rollout->from_tip);
         memcpy(rollout->from_velocity, now->velocity, sizeof rollout->from_velocity);
         begin(escape, 0, &model->params->remedy, now);
     }

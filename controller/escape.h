@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Escape: out of places where the forces of goal and obstacles balance. When the arm is stuck, its motion is rolled out
-// with circulations of several directions around the obstacles, on the plant model and with the guard, a bounded number
-// of steps a tick; the direction that ends nearest to the goal is taken.
+// in several ways, on the plant model and with the guard, a bounded number of steps a tick: on as it is, with
+// circulations around the obstacles, or aside for a moment. The way that ends nearest to the goal is taken.
 //
 // A circulation c turns the repulsion of obstacles aside by c x (-n): a vortex field (De Medio & Oriolo 1991). Choosing
 // its direction by predicted motion follows Becker et al., "Circular fields and predictive multi-agents for online
@@ -36,10 +36,11 @@ struct lw_escape_now {
     struct lw_stuck_tick tick;
 };
 
-// A way out to try: turning around obstacles, or going by a point beside the way first.
+// A way out to try: turning around obstacles, or moving aside in any direction first.
 struct lw_way_out {
     double circulation[3]; // axis times strength
-    double detour[3];      // m, from the tip where it was stuck to the point to go by; zero = none
+    bool moves_aside;
+    double aside[LW_NJ]; // rad/s, to move with first, the goal left alone
 };
 
 // A roll-out in progress.
@@ -49,7 +50,6 @@ struct lw_rollout {
     int64_t from_ns;
     double from_q[LW_NJ], from_velocity[LW_NJ]; // where all candidates start
     double q[LW_NJ], velocity[LW_NJ];           // where this one is
-    double from_tip[3];                         // m
     struct lw_way_out way;                      // of this candidate
     double best;                                // m, deviation at the end of the best candidate so far
     struct lw_way_out best_way;
@@ -58,8 +58,8 @@ struct lw_rollout {
 struct lw_escape {
     struct lw_stuck stuck;
     double circulation[3]; // in force
-    double by[3];          // m, point to go by, and until when; by_until_ns 0 = none
-    int64_t by_until_ns;
+    double aside[LW_NJ];   // rad/s, motion that leaves the goal alone, until when; 0 = none
+    int64_t aside_until_ns;
     int attempts;          // decisions for this goal so far
     int64_t wait_until_ns; // no roll-out begins before
     double nearest;        // m, smallest deviation since the last decision
@@ -73,11 +73,11 @@ void lw_escape_reset(struct lw_escape *escape, const struct lw_remedy_params *pa
 // The arm is braked: it stands for another reason. The circulation found stays.
 void lw_escape_pause(struct lw_escape *escape);
 
-// Where the tip is sent at a time: to the goal, or to the point to go by.
-const double *lw_escape_target(const struct lw_escape *escape, const double goal[3], int64_t time_ns);
+// The motion aside in force at a time; NULL = none.
+const double *lw_escape_aside(const struct lw_escape *escape, int64_t time_ns);
 
 // One tick: notes the deviation, rolls out, decides. The circulation in force afterwards is escape->circulation.
-// Returns whether the tip is stuck. Cost: law and guard once for every 125 us of the period, nothing while it moves on.
+// Returns whether the tip is stuck. Cost: law and guard once for every 50 us of the period, nothing while it moves on.
 bool lw_escape_step(struct lw_escape *escape, const struct lw_escape_model *model, const struct lw_escape_now *now);
 
 #endif

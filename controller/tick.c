@@ -151,11 +151,14 @@ static unsigned brake_reasons(const struct lw_controller *config, const struct l
 static void ask_law(const struct lw_controller *config, const struct lw_controller_state *state, int64_t time_ns,
                     const struct lw_surroundings *around, struct lw_joint_command *out)
 {
+    const double *aside = lw_escape_aside(&state->escape, time_ns);
     const struct lw_law_input in = {.around = around,
                                     .body = &config->body,
-                                    .goal = lw_escape_target(&state->escape, state->request.goal, time_ns),
+                                    .goal = aside != NULL ? around->frame[LW_NJ - 1].p : state->request.goal,
                                     .circulation = state->escape.circulation};
     config->law->step(&config->params, &in, out->qd_law);
+    for (int j = 0; aside != NULL && j < LW_NJ; j++)
+        out->qd_law[j] += aside[j];
     out->law_outcome = lw_all_finite(out->qd_law, LW_NJ) ? LW_LAW_OK : LW_LAW_NO_NUMBER;
     memcpy(out->circulation, state->escape.circulation, sizeof out->circulation);
     double to_goal[3];

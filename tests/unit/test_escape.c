@@ -173,12 +173,12 @@ static void the_vortex_is_always_on(void **state)
     assert_int_equal(law_calls, 0);
 }
 
-// A tick looks ahead by one step for every 125 us of its period, and only while it is stuck.
+// A tick looks ahead by one step for every 50 us of its period, and only while it is stuck.
 static void a_tick_looks_ahead_a_bounded_number_of_steps(void **state)
 {
     (void)state;
     const int64_t periods_ns[] = {8 * ms, ms, ms / 5};
-    const int most[] = {64, 8, 2};
+    const int most[] = {160, 20, 4};
     for (int i = 0; i < 3; i++) {
         struct rig rig = scene_b(LW_REMEDY_ROLLOUT, periods_ns[i]);
         int seen = 0;
@@ -190,11 +190,11 @@ static void a_tick_looks_ahead_a_bounded_number_of_steps(void **state)
             seen += law_calls;
         }
         assert_int_equal(rig.escape.attempts, 1);
-        assert_int_equal(seen, 5 * 375);
+        assert_int_equal(seen, 17 * 625);
     }
 }
 
-// Where no direction helps, none is taken, and it tries again ever later.
+// Where no way helps there is no circulation in the end, and it tries again ever later.
 static void nothing_is_done_where_nothing_helps(void **state)
 {
     (void)state;
@@ -211,8 +211,11 @@ static void nothing_is_done_where_nothing_helps(void **state)
         before_ns = rig.time_ns;
         assert_true(k < 10000);
     }
-    for (int i = 2; i < 6; i++)
-        assert_near((double)waits_ns[i] * 1e-9, i < 5 ? 1 << (i - 1) : 8, 0.3);
+    for (int i = 2; i < 6; i++) {
+        // A look ahead and the wait before it; longer where the arm first had to stand still again.
+        const double least = 0.53 + 0.25 * fmin(1 << (i - 1), 8);
+        assert_true((double)waits_ns[i] * 1e-9 > least - 0.05 && (double)waits_ns[i] * 1e-9 < least + 2);
+    }
     for (int i = 0; i < 3; i++)
         assert_near(rig.escape.circulation[i], 0, 0);
 }

@@ -1,0 +1,1 @@
+"""Random scenes: how often each way of keeping clear reaches its goal (./dev bench scenes)."""
