@@ -27,7 +27,7 @@ def draw_picture(outcomes: list[Outcome], path: Path) -> None:
     near.axvline(0, color="0.5", linewidth=0.8)
     near.set(xlabel="smallest clearance of the run, mm", ylabel="share of scenes")
     times.set(xlabel="time to the goal, s", ylabel="share of scenes", xlim=(0, DURATION_S))
-    times.legend(loc="lower right")
+    times.legend(loc="upper left")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -44,4 +44,4 @@ def _draw_rates(axes: Any, results: dict[str, Any], ways: list[str]) -> None:
     axes.set_yticks(range(len(ways)), [way.replace(" + ", "\n+ ") for way in ways])
     axes.invert_yaxis()
     axes.set(xlabel="reached its goal, % (95 % interval)", xlim=(0, 100))
-    axes.legend(loc="lower left")
+    axes.legend(loc="upper right")
