@@ -48,6 +48,50 @@ struct lw_law_reach lw_clearance_reach(const struct lw_guard_input *in, const st
     return (struct lw_law_reach){.obstacles = limits->clearance + way + coming, .self = limits->clearance + 2 * way};
 }
 
+// Adds the room of a point of a part that is `ahead` of the nearest point: it moves along n with its link, and what is
+// on the other side, where that is a link, with its own nearest point.
+static void add_room(struct lw_rooms *rooms, const struct lw_near *pair, int part, const double point[3],
+                     double clearance)
+{
+    const struct lw_distance *d = &pair->distance;
+    const bool first = part == pair->part;
+    const double *nearest = first ? d->pa : d->pb, *facing = first ? d->pb : d->pa;
+    const double r = rooms->around->placed.capsule[part].r;
+    double n[3], between[3], other[LW_NJ];
+    struct lw_room *room = &rooms->room[rooms->count++];
+    for (int k = 0; k < 3; k++) {
+        n[k] = first ? d->n[k] : -d->n[k];
+        between[k] = point[k] - (nearest[k] + r * n[k]);
+    }
+    room->room = d->d + lw_vec_dot(n, between) - clearance;
+    room->approach = fmax(lw_vec_dot(d->n, pair->velocity), 0);
+    lw_arm_point_effect(rooms->around->frame, rooms->body->part[part].link, point, n, room->gradient);
+    if (pair->obstacle != 0)
+        return;
+    const int across = first ? pair->other : pair->part;
+    lw_arm_point_effect(rooms->around->frame, rooms->body->part[across].link, facing, n, other);
+    for (int j = 0; j < LW_NJ; j++)
+        room->gradient[j] -= other[j];
+}
+
+// Adds the rooms of both ends of a part's axis; of a tool hull, whose capsule is wider than it, that of its nearest
+// point.
+static void add_rooms(struct lw_rooms *rooms, const struct lw_near *pair, int part, double clearance)
+{
+    const struct lw_capsule *c = &rooms->around->placed.capsule[part];
+    const double *n = pair->distance.n, *nearest = part == pair->part ? pair->distance.pa : pair->distance.pb;
+    if (part == rooms->body->tool_part && rooms->body->tool.kind == LW_TOOL_HULL) {
+        double point[3];
+        for (int k = 0; k < 3; k++)
+            point[k] = nearest[k] + (part == pair->part ? c->r : -c->r) * n[k];
+        add_room(rooms, pair, part, point, clearance);
+        return;
+    }
+    add_room(rooms, pair, part, c->a, clearance);
+    if (c->a[0] != c->b[0] || c->a[1] != c->b[1] || c->a[2] != c->b[2])
+        add_room(rooms, pair, part, c->b, clearance);
+}
+
 void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reach, const struct lw_body *body,
                         const struct lw_surroundings *s, struct lw_rooms *rooms)
 {
@@ -60,10 +104,9 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
         const struct lw_near *pair = &s->near.pair[i];
         if (pair->fixed || pair->distance.d > (pair->obstacle != 0 ? reach.obstacles : reach.self))
             continue;
-        struct lw_room *room = &rooms->room[rooms->count++];
-        lw_surroundings_gradient(s, body, pair, room->gradient);
-        room->room = pair->distance.d - limits->clearance;
-        room->approach = fmax(lw_vec_dot(pair->distance.n, pair->velocity), 0);
+        add_rooms(rooms, pair, pair->part, limits->clearance);
+        if (pair->obstacle == 0)
+            add_rooms(rooms, pair, pair->other, limits->clearance);
     }
 }
 

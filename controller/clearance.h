@@ -16,10 +16,14 @@
 
 #include <stdbool.h> // bool
 
-// What a near pair leaves: the arm may close in on it only so fast that it can still stop.
+// A near obstacle pair has a room for each end of the link's axis, a self pair one for each end of both.
+enum { LW_ROOMS_MAX = 4 * LW_NEAR_MAX };
+
+// What a near pair leaves an end of a link: it may close in on the plane between the two, which bounds what is convex,
+// only so fast that it can still stop.
 struct lw_room {
-    double gradient[LW_NJ]; // m/rad, of the distance by the joint positions
-    double room;            // m, distance less the one to keep
+    double gradient[LW_NJ]; // m/rad, of the end's distance from the plane by the joint positions
+    double room;            // m, that distance less the one to keep
     double approach;        // m/s, how fast the obstacle comes by itself, >= 0
 };
 
@@ -27,7 +31,7 @@ struct lw_rooms {
     const struct lw_surroundings *around; // where the body is; NULL = its ways are straight
     const struct lw_body *body;
     int count;
-    struct lw_room room[LW_NEAR_MAX];
+    struct lw_room room[LW_ROOMS_MAX];
 };
 
 // Distances within which lw_clearance_command may have something to say: the way of the fastest point of the arm until
