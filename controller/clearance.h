@@ -48,11 +48,10 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
                         const struct lw_surroundings *s, struct lw_rooms *rooms);
 
 // Largest part in [0, 1] of a velocity that can be braked to rest within every room. Braking along a straight line in
-// joint space takes T = max |qd_j| / a_j; with c = -gradient . qd the pair needs c (T/2 + period) of its room, and
-// approach (T + period) more where the obstacle comes by itself. Distances to convex things only grow faster than
-// straight motion tells, but points of the arm move in curves: with w = sum |qd_j| and v the speed of the fastest point
-// they leave the straight way by at most w v T^2 / 4 until they rest, which every pair has to have as well, also one
-// that is left. A pair that is left and has no room asks for none.
+// joint space takes T = max |qd_j| / a_j; with c = -gradient . qd the room has to hold c (T/2 + period), and approach
+// (T + period) more where the obstacle comes by itself. Points of the arm move in curves: with w = sum |qd_j| and v the
+// speed of the fastest point they leave the straight way by at most w v T^2 / 4 until they rest, which every room has
+// to hold as well, also one that is left. A room that is used up is asked for nothing by what leaves it.
 double lw_clearance_part(const struct lw_limits *limits, double period_s, const struct lw_rooms *rooms,
                          const double velocity[LW_NJ]);
 

@@ -66,7 +66,7 @@ LW_MUST_CHECK enum lw_status lw_controller_init(struct lw_controller *config, st
 // One tick: estimate, select request, look around, law, guard, explain.
 //   out  command and explanation; stamp, compute_ns, wake_late_ns, previous_exec_ns and skipped are left 0 for the
 //        process to fill
-// Cost: fixed, plus the broad phase over all obstacles, plus the pairs in reach; about 0.3 MB of stack.
+// Cost: fixed, plus the broad phase over all obstacles, plus the pairs in reach; about 0.9 MB of stack.
 void lw_tick(const struct lw_controller *config, struct lw_controller_state *state, const struct lw_tick_input *in,
              struct lw_joint_command *out);
 

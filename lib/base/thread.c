@@ -13,7 +13,7 @@
 #include <stddef.h>   // size_t
 #include <sys/mman.h> // mlockall, mmap
 
-enum { PREFAULT_BYTES = 256 * 1024, PAGE_BYTES = 4096, TRIAL_BYTES = 64 * 1024 * 1024 };
+enum { PREFAULT_BYTES = 1 << 20, PAGE_BYTES = 4096, TRIAL_BYTES = 64 * 1024 * 1024 };
 
 bool lw_thread_lock_memory(void)
 {
