@@ -31,13 +31,13 @@ def _edited(root, tmp_path, old, new):
 
 
 EDITS = [
-    ("unknown key", "  eta: 3", "  eeta: 3", ["scene.yaml:24", "law.eeta", "unknown key", "eta"]),
+    ("unknown key", "  eta: 3", "  eeta: 3", ["scene.yaml:26", "law.eeta", "unknown key", "eta"]),
     ("missing key", "robot: ur5\n", "", ["robot", "missing key", "ur5"]),
     (
         "text for a number",
         "k_a: 1",
         "k_a: fast",
-        ["scene.yaml:23", "law.k_a", "a number > 0", '"fast"'],
+        ["scene.yaml:25", "law.k_a", "a number > 0", '"fast"'],
     ),
     ("NaN", "eta: 3", "eta: .nan", ["law.eta", ".nan"]),
     ("negative rho", "rho_rep: 0.5", "rho_rep: -0.5", ["law.rho_rep", "> 0", "-0.5"]),

@@ -40,6 +40,10 @@ q0: {start}
 # A longer reach of the repulsion adds up over the crowd, and the arm stands still half way.
 law:
   rho_rep: 0.1
+  eta: 0.01
+  k_a: 1
+  r0: 0.05
+  remedy: none
 
 request:
   goal: {goal}
