@@ -262,63 +262,80 @@ static void the_reach_covers_what_could_matter(void **state)
     assert_near(lw_clearance_reach(&in, &body, &here, 1).obstacles, 0, 0);
 }
 
-// An arm that moves at any speed beside a wall of the world and is braked along a straight line in joint space from an
-// allowed velocity keeps the clearance to the wall, curved as the ways of its points are; without room for the curve
-// some would not.
+// --- curved ways ---
+
+static struct lw_snapshot one_ball;
+static struct lw_body braked;
+static const struct lw_eyes braked_eyes = {.body = &braked, .world = &one_ball, .reach = HUGE_VAL, .self_reach = 0};
+
+// Smallest distance of what can move to the ball while the arm brakes along a straight line in joint space.
+static double smallest_while_braking(const struct lw_limits *l, const double q[LW_NJ], const double velocity[LW_NJ])
+{
+    static struct lw_surroundings later;
+    double at[LW_NJ], time = 0, smallest = HUGE_VAL;
+    memcpy(at, q, sizeof at);
+    for (int j = 0; j < LW_NJ; j++)
+        time = fmax(time, fabs(velocity[j]) / l->acceleration[j]);
+    for (int k = 0; k * period_s < time; k++) {
+        for (int j = 0; j < LW_NJ; j++)
+            at[j] += period_s * velocity[j] * (1 - k * period_s / time);
+        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, at, &later), LW_OK);
+        lw_surroundings_look(&braked_eyes, &later);
+        for (int i = 0; i < later.near.count; i++)
+            if (later.near.pair[i].obstacle != 0 && !later.near.pair[i].fixed)
+                smallest = fmin(smallest, later.near.pair[i].distance.d);
+    }
+    return smallest;
+}
+
+// A ball somewhere, an arm somewhere, clear of it and not mounted on it. Returns false when it is not.
+static bool draw_start(struct random *random, double q[LW_NJ], struct lw_surroundings *here)
+{
+    const struct lw_solid ball = {.kind = LW_SPHERE, .radius = 0.1};
+    struct lw_pose pose = {.r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    random_fill(random, -3, 3, q, LW_NJ);
+    random_fill(random, -0.8, 0.8, pose.p, 3);
+    lw_snapshot_begin(&one_ball);
+    assert_int_equal(lw_snapshot_add(&one_ball, 1, 1, &ball, &pose, NULL), LW_OK);
+    lw_snapshot_end(&one_ball);
+    assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, q, here), LW_OK);
+    lw_surroundings_look(&braked_eyes, here);
+    bool mounted = false;
+    for (int i = 0; i < here->near.count; i++)
+        mounted |= here->near.pair[i].fixed;
+    return !mounted && lw_surroundings_nearest(here, false)->distance.d >= 0.02;
+}
+
+// Braked along a straight line in joint space from an allowed velocity no arm comes nearer to a ball than the
+// clearance, curved as the ways of its points are; without room for the curve some would.
 static void curved_ways_keep_the_clearance(void **state)
 {
     (void)state;
     struct random random = {76};
-    static struct lw_surroundings here, later;
-    static struct lw_snapshot world;
-    static struct lw_body body;
+    static struct lw_surroundings here;
     static struct lw_rooms rooms;
-    lw_body_make(LW_UR5, LW_BODY_CAPSULES, NULL, &body);
     const struct lw_limits l = limits(8);
+    const struct lw_law_reach everything = {HUGE_VAL, HUGE_VAL};
     int cut = 0, would_touch = 0;
+    lw_body_make(LW_UR5, LW_BODY_CAPSULES, NULL, &braked);
     for (int n = 0; n < 6000; n++) {
-        double q[LW_NJ], velocity[LW_NJ];
-        random_fill(&random, -3, 3, q, LW_NJ);
+        double q[LW_NJ], velocity[LW_NJ], part[2], smallest[2];
+        const bool clear = draw_start(&random, q, &here);
         random_fill(&random, -3, 3, velocity, LW_NJ);
-        const struct lw_solid ball = {.kind = LW_SPHERE, .radius = 0.1};
-        struct lw_pose pose = {.r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-        random_fill(&random, -0.8, 0.8, pose.p, 3);
-        lw_snapshot_begin(&world);
-        assert_int_equal(lw_snapshot_add(&world, 1, 1, &ball, &pose, NULL), LW_OK);
-        lw_snapshot_end(&world);
-        const struct lw_eyes eyes = {.body = &body, .world = &world, .reach = HUGE_VAL, .self_reach = 0};
-        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &body, q, &here), LW_OK);
-        lw_surroundings_look(&eyes, &here);
-        bool mounted = lw_surroundings_nearest(&here, false)->distance.d < 0.02;
-        for (int i = 0; i < here.near.count; i++)
-            mounted |= here.near.pair[i].fixed;
-        if (mounted)
+        if (!clear)
             continue;
-        const struct lw_law_reach everything = {HUGE_VAL, HUGE_VAL};
-        lw_clearance_rooms(&l, everything, &body, &here, &rooms);
+        lw_clearance_rooms(&l, everything, &braked, &here, &rooms);
         for (int straight = 0; straight < 2; straight++) {
+            double allowed[LW_NJ];
             rooms.around = straight ? NULL : &here;
-            const double part = lw_clearance_part(&l, period_s, &rooms, velocity);
-            double v[LW_NJ], at[LW_NJ], time = 0, smallest = HUGE_VAL;
-            for (int j = 0; j < LW_NJ; j++) {
-                v[j] = part * velocity[j];
-                time = fmax(time, fabs(v[j]) / l.acceleration[j]);
-            }
-            memcpy(at, q, sizeof at);
-            for (int k = 0; k * period_s < time + period_s; k++) {
-                for (int j = 0; j < LW_NJ; j++)
-                    at[j] += period_s * v[j] * fmax(1 - k * period_s / time, 0);
-                assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &body, at, &later), LW_OK);
-                lw_surroundings_look(&eyes, &later);
-                for (int i = 0; i < later.near.count; i++)
-                    if (later.near.pair[i].obstacle != 0 && !later.near.pair[i].fixed)
-                        smallest = fmin(smallest, later.near.pair[i].distance.d);
-            }
-            cut += !straight && part < 1;
-            would_touch += straight && smallest < l.clearance - 1e-6;
-            if (!straight)
-                assert_true(smallest > l.clearance - 1e-9);
+            part[straight] = lw_clearance_part(&l, period_s, &rooms, velocity);
+            for (int j = 0; j < LW_NJ; j++)
+                allowed[j] = part[straight] * velocity[j];
+            smallest[straight] = smallest_while_braking(&l, q, allowed);
         }
+        cut += part[0] < 1;
+        would_touch += smallest[1] < l.clearance - 1e-6;
+        assert_true(smallest[0] > l.clearance - 1e-9);
     }
     assert_true(cut > 50);
     assert_true(would_touch > 0);
