@@ -11,9 +11,20 @@
 #include "arm/joint.h" // enum lw_flag
 #include "base/vec.h"  // lw_all_finite
 
-#include <math.h>    // fmin, fabs, floor, sqrt
+#include <math.h>    // fabs, floor, sqrt
 #include <stdbool.h> // bool
 #include <string.h>  // memcpy
+
+// Of finite numbers and inf; the library's fmin and fmax, which heed NaN, are calls.
+static double lesser(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static double greater(double a, double b)
+{
+    return a > b ? a : b;
+}
 
 double lw_guard_braking_velocity(double room, double acceleration, double period_s)
 {
@@ -49,7 +60,7 @@ static bool clamp_each(const double low[LW_NJ], const double high[LW_NJ], double
 {
     bool changed = false;
     for (int j = 0; j < LW_NJ; j++) {
-        const double clamped = fmax(low[j], fmin(high[j], value[j]));
+        const double clamped = greater(low[j], lesser(high[j], value[j]));
         changed |= clamped != value[j];
         value[j] = clamped;
     }
@@ -61,7 +72,7 @@ static bool limit_velocity(const struct lw_limits *limits, double target[LW_NJ])
 {
     double scale = 1;
     for (int j = 0; j < LW_NJ; j++)
-        scale = fmin(scale, part_within(target[j], limits->velocity[j]));
+        scale = lesser(scale, part_within(target[j], limits->velocity[j]));
     for (int j = 0; scale < 1 && j < LW_NJ; j++)
         target[j] *= scale;
     return scale < 1;
@@ -73,7 +84,7 @@ static bool limit_acceleration(const struct lw_limits *limits, double period_s, 
 {
     double scale = 1;
     for (int j = 0; j < LW_NJ; j++)
-        scale = fmin(scale, part_within(target[j] - velocity[j], limits->acceleration[j] * period_s));
+        scale = lesser(scale, part_within(target[j] - velocity[j], limits->acceleration[j] * period_s));
     for (int j = 0; scale < 1 && j < LW_NJ; j++)
         target[j] = velocity[j] + scale * (target[j] - velocity[j]);
     return scale < 1;
@@ -85,8 +96,8 @@ static void reachable_bounds(const struct lw_limits *limits, double period_s, co
 {
     for (int j = 0; j < LW_NJ; j++) {
         const double step = limits->acceleration[j] * period_s;
-        low[j] = fmin(low[j], velocity[j] + step);
-        high[j] = fmax(high[j], velocity[j] - step);
+        low[j] = lesser(low[j], velocity[j] + step);
+        high[j] = greater(high[j], velocity[j] - step);
     }
 }
 

@@ -189,6 +189,15 @@ static void add_pairs(struct lw_body *body)
                     body->pair[body->pair_count++] = (struct lw_body_pair){(uint8_t)i, (uint8_t)j};
 }
 
+static void find_lengths(struct lw_body *body)
+{
+    for (int i = 0; i < body->count; i++) {
+        double axis[3];
+        lw_vec_sub(body->part[i].capsule.b, body->part[i].capsule.a, axis);
+        body->part[i].length = lw_vec_norm(axis);
+    }
+}
+
 // A part is within its own size of its frame's origin, and each link within its DH lengths of the one before.
 static void find_levers(enum lw_robot robot, struct lw_body *body)
 {
@@ -227,6 +236,7 @@ void lw_body_make(enum lw_robot robot, enum lw_body_model model, const struct lw
         add_tool(tool, body);
     if (model != LW_BODY_JOINTS)
         add_pairs(body);
+    find_lengths(body);
     find_levers(robot, body);
 }
 
@@ -239,6 +249,11 @@ static void place_point(const struct lw_pose *frame, const double x[3], double o
         out[k] = lw_vec_dot(&frame->r[3 * k], x) + frame->p[k];
 }
 
+void lw_body_mark(struct lw_placed *placed, int part, double length)
+{
+    placed->cull[part] = lw_cull_link(&placed->capsule[part], length);
+}
+
 void lw_body_place(const struct lw_body *body, const struct lw_pose frame[LW_NJ], struct lw_placed *placed)
 {
     for (int i = 0; i < body->count; i++) {
@@ -246,6 +261,7 @@ void lw_body_place(const struct lw_body *body, const struct lw_pose frame[LW_NJ]
         place_point(&frame[part->link - 1], part->capsule.a, placed->capsule[i].a);
         place_point(&frame[part->link - 1], part->capsule.b, placed->capsule[i].b);
         placed->capsule[i].r = part->capsule.r;
+        lw_body_mark(placed, i, part->length);
     }
     if (body->tool.kind != LW_TOOL_HULL)
         return;

@@ -10,6 +10,7 @@
 #define LW_COLLISION_BODY_H
 
 #include "arm/arm.h"         // enum lw_robot, struct lw_pose
+#include "collision/cull.h"  // struct lw_cull
 #include "collision/shape.h" // struct lw_capsule, LW_HULL_*
 
 #include <stdint.h> // uint8_t
@@ -34,6 +35,7 @@ struct lw_tool {
 struct lw_body_part {
     int link;                  // 1..6
     struct lw_capsule capsule; // m, in the frame of the link; of a tool hull: one that holds it
+    double length;             // m, of the capsule's axis
 };
 
 // Two parts whose distance matters.
@@ -62,6 +64,7 @@ struct lw_body {
 // A body at one configuration.
 struct lw_placed {
     struct lw_capsule capsule[LW_BODY_MAX];
+    struct lw_cull cull[LW_BODY_MAX];                 // the capsules for the broad phase
     double tool_centre[3], tool_vertex[LW_HULL_ROOM]; // of a tool hull
 };
 
@@ -77,6 +80,10 @@ void lw_body_make(enum lw_robot robot, enum lw_body_model model, const struct lw
 // Puts a body where the arm is.
 //   frame  in  [6] from lw_arm_fk
 void lw_body_place(const struct lw_body *body, const struct lw_pose frame[LW_NJ], struct lw_placed *placed);
+
+// Puts one part, its capsule already in `placed`, before the broad phase; lw_body_place does it for all.
+//   length  in  m, of the capsule's axis
+void lw_body_mark(struct lw_placed *placed, int part, double length);
 
 // The placed hull of a body whose tool is one; its vertices stay in `placed`.
 struct lw_shape lw_body_tool_shape(const struct lw_body *body, const struct lw_placed *placed);

@@ -12,15 +12,15 @@
 
 #include <math.h> // fabs
 
-struct lw_cull lw_cull_link(const struct lw_capsule *link, double d_max)
+struct lw_cull lw_cull_link(const struct lw_capsule *link, double length)
 {
-    struct lw_cull cull;
+    struct lw_cull cull = {.reach = 0};
     double axis[3], size = 0;
     lw_vec_sub(link->b, link->a, axis);
-    const double length = lw_vec_norm(axis);
+    const double per_length = length > 0 ? 1 / length : 0;
     for (int k = 0; k < 3; k++) {
         cull.m[k] = (float)(link->a[k] + 0.5 * axis[k]);
-        cull.e[k] = (float)(length > 0 ? axis[k] / length : 0);
+        cull.e[k] = (float)(per_length * axis[k]);
         size += fabs(link->a[k]) + fabs(link->b[k]);
     }
     // Rounding moves the axis by less than 4e-7 of its coordinates. The squared distance of a sphere has an error of
@@ -29,6 +29,5 @@ struct lw_cull lw_cull_link(const struct lw_capsule *link, double d_max)
     for (int k = 0; k < 3; k++)
         cull.side[k] = (float)(0.5 * fabs(axis[k]) * (1 + 1e-6));
     cull.thick = (float)(link->r * (1 + 1e-6) + 4e-7 * size);
-    lw_cull_look(&cull, d_max);
     return cull;
 }

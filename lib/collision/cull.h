@@ -12,9 +12,10 @@
 
 #include "collision/shape.h" // struct lw_capsule
 
-#include <math.h>   // sqrtf
-#include <stdint.h> // int32_t
-#include <string.h> // memcpy
+#include <math.h>    // sqrtf
+#include <stdbool.h> // bool
+#include <stdint.h>  // int32_t
+#include <string.h>  // memcpy
 
 // Pointers to the first of sixteen.
 struct lw_spheres {
@@ -30,19 +31,28 @@ struct lw_cull {
     float m[3], e[3], half;
     float side[3]; // half sides of the box around its axis
     float thick;   // its radius, rounded up
-    float reach;   // thick and the distance that counts as near
+    float reach;   // thick and the distance that counts as near, by lw_cull_look
 };
 
 typedef float lw_four __attribute__((vector_size(16)));
 typedef int32_t lw_four_mask __attribute__((vector_size(16)));
 
-// The link for lw_cull_*.
-struct lw_cull lw_cull_link(const struct lw_capsule *link, double d_max);
+// The link for lw_cull_*, that looks at nothing yet.
+//   length  in  m, of its axis
+struct lw_cull lw_cull_link(const struct lw_capsule *link, double length);
 
 // Sets the distance that counts as near.
 static inline void lw_cull_look(struct lw_cull *link, double d_max)
 {
-    link->reach = (float)(((double)link->thick + d_max) * (1 + 1e-6) + 1e-5 + 1e-3 * (double)link->half);
+    link->reach = (link->thick + (float)d_max) * (1 + 2e-6F) + 1e-5F + 1e-3F * link->half;
+}
+
+// Whether the distance of two links may be at most d_max.
+static inline bool lw_cull_pair(const struct lw_cull *a, const struct lw_cull *b, double d_max)
+{
+    const float x = a->m[0] - b->m[0], y = a->m[1] - b->m[1], z = a->m[2] - b->m[2];
+    const float reach = a->half + b->half + a->thick + b->thick + (float)d_max;
+    return !(x * x + y * y + z * z > reach * reach * (1 + 4e-6F));
 }
 
 // Index of the least of some values.
@@ -106,12 +116,12 @@ static inline unsigned lw_cull_bits(lw_four_mask near)
     return (unsigned)(near[0] | near[1] | near[2] | near[3]);
 }
 
-// Bit i is set when sphere i may be near.
+// Bit i is set when sphere i of the first `count` may be near; the bits of others mean nothing.
 //   slack  in  m, how far they may have moved
-static inline unsigned lw_cull_spheres(const struct lw_spheres *s, const struct lw_cull *link, float slack)
+static inline unsigned lw_cull_spheres(const struct lw_spheres *s, int count, const struct lw_cull *link, float slack)
 {
     lw_four_mask near = {0, 0, 0, 0};
-    for (int i = 0; i < 16; i += 4)
+    for (int i = 0; i < count; i += 4)
         near |= lw_cull_within(lw_cull_spheres_square(s, i, link), lw_four_load(s->r + i) + (link->reach + slack), i);
     return lw_cull_bits(near);
 }

@@ -16,6 +16,7 @@
 #include <math.h>    // isnan, NAN, HUGE_VAL
 #include <stdbool.h> // bool
 #include <stddef.h>  // NULL
+#include <string.h>  // memset
 
 enum { BOXES = LW_WORLD_BLOCKS + LW_WORLD_GROUPS, FEW_BLOCKS = 3 };
 
@@ -72,6 +73,11 @@ static struct walk walk_from(const struct sweep *sweep, const struct lw_cull *li
         walk.blocks = (1U << blocks) - 1;
     }
     return walk;
+}
+
+static int lesser(int a, int b)
+{
+    return a < b ? a : b;
 }
 
 static int take_lowest(unsigned *bits)
@@ -187,8 +193,7 @@ static bool measure(const struct lw_near_query *query, int part, int i, double d
         return false;
     if (moving != NULL)
         lw_moving_forth(moving, &out->distance);
-    for (int k = 0; k < 3; k++)
-        out->velocity[k] = 0;
+    memset(out->velocity, 0, sizeof out->velocity);
     if (item->traits & LW_TRAIT_MOVES)
         lw_moving_velocity(item, moving, out->distance.pb, out->velocity);
     return true;
@@ -210,11 +215,12 @@ static void list_block(const struct sweep *sweep, int part, const struct lw_cull
                        struct lw_near_list *out)
 {
     const struct lw_spheres spheres = spheres_at(sweep, block);
-    unsigned near = lw_cull_spheres(&spheres, link, sweep->slack[block]);
+    const int first = block * LW_WORLD_BLOCK, count = lesser(sweep->query->world->bounded - first, LW_WORLD_BLOCK);
+    unsigned near = lw_cull_spheres(&spheres, count, link, sweep->slack[block]);
     while (near != 0) {
-        const int i = block * LW_WORLD_BLOCK + take_lowest(&near);
-        if (i < sweep->query->world->bounded)
-            list(sweep, part, i, out);
+        const int i = take_lowest(&near);
+        if (i < count)
+            list(sweep, part, first + i, out);
     }
 }
 
@@ -224,7 +230,8 @@ void lw_near_range(const struct lw_near_query *query, struct lw_near_list *out)
     start(query, &sweep);
     out->count = out->needed = 0;
     for (int part = 0; part < query->body->count; part++) {
-        const struct lw_cull link = lw_cull_link(&query->placed->capsule[part], query->d_max);
+        struct lw_cull link = query->placed->cull[part];
+        lw_cull_look(&link, query->d_max);
         struct walk walk = walk_from(&sweep, &link);
         for (int block = next_block(&walk); block >= 0; block = next_block(&walk))
             list_block(&sweep, part, &link, block, out);
@@ -238,7 +245,11 @@ void lw_near_range(const struct lw_near_query *query, struct lw_near_list *out)
 static void measure_self(const struct lw_body *body, const struct lw_placed *placed, struct lw_body_pair pair,
                          struct lw_near *out)
 {
-    *out = (struct lw_near){.part = pair.part, .other = pair.other};
+    out->part = pair.part;
+    out->other = pair.other;
+    out->obstacle = 0;
+    out->fixed = false;
+    memset(out->velocity, 0, sizeof out->velocity);
     if (pair.other != body->tool_part || body->tool.kind != LW_TOOL_HULL) {
         lw_distance_capsules(&placed->capsule[pair.part], &placed->capsule[pair.other], &out->distance);
         return;
@@ -247,27 +258,10 @@ static void measure_self(const struct lw_body *body, const struct lw_placed *pla
     lw_distance_link(&placed->capsule[pair.part], &tool, HUGE_VAL, NULL, &out->distance);
 }
 
-// Whether two parts are farther apart than d_max for certain.
-static bool far_apart(const struct lw_capsule *a, const struct lw_capsule *b, double d_max)
-{
-    double between[3], square = 0, reach = 2 * (a->r + b->r + d_max);
-    for (int k = 0; k < 3; k++) {
-        between[k] = a->a[k] + a->b[k] - b->a[k] - b->b[k]; // twice that of their middles
-        square += between[k] * between[k];
-    }
-    double length[2][3];
-    lw_vec_sub(a->b, a->a, length[0]);
-    lw_vec_sub(b->b, b->a, length[1]);
-    reach += lw_vec_norm(length[0]) + lw_vec_norm(length[1]);
-    return square > reach * reach * (1 + 1e-9);
-}
-
 void lw_near_self(const struct lw_body *body, const struct lw_placed *placed, double d_max, struct lw_near_list *out)
 {
     for (int i = 0; i < body->pair_count; i++) {
-        const struct lw_capsule *part = &placed->capsule[body->pair[i].part],
-                                *other = &placed->capsule[body->pair[i].other];
-        if (far_apart(part, other, d_max))
+        if (!lw_cull_pair(&placed->cull[body->pair[i].part], &placed->cull[body->pair[i].other], d_max))
             continue;
         struct lw_near spare, *near = out->count < LW_NEAR_MAX ? &out->pair[out->count] : &spare;
         measure_self(body, placed, body->pair[i], near);
@@ -332,11 +326,6 @@ static void keep_for_next(const struct nearest *nearest, struct lw_warm_pair *la
         *last = (struct lw_warm_pair){nearest->best.part, nearest->index, nearest->best.obstacle};
 }
 
-static int lesser(int a, int b)
-{
-    return a < b ? a : b;
-}
-
 // An obstacle that is likely to be near: of the nearest box of the nearest group the nearest one. -1 = there is none.
 static int guess(const struct sweep *sweep, const struct lw_cull *link)
 {
@@ -356,14 +345,15 @@ static void search_block(const struct sweep *sweep, int part, struct lw_cull *li
 {
     const struct lw_spheres spheres = spheres_at(sweep, block);
     const int first = block * LW_WORLD_BLOCK, known = nearest->best.part == part ? nearest->index : -1;
-    unsigned near = lw_cull_spheres(&spheres, link, sweep->slack[block]);
+    const int count = lesser(sweep->query->world->bounded - first, LW_WORLD_BLOCK);
+    unsigned near = lw_cull_spheres(&spheres, count, link, sweep->slack[block]);
     while (near != 0) {
         const int i = first + take_lowest(&near);
-        if (i >= sweep->query->world->bounded || i == known || !improve(sweep, part, i, nearest))
+        if (i >= first + count || i == known || !improve(sweep, part, i, nearest))
             continue;
         // Nothing beyond the new best is worth a look.
         lw_cull_look(link, nearest->best.distance.d);
-        near &= lw_cull_spheres(&spheres, link, sweep->slack[block]);
+        near &= lw_cull_spheres(&spheres, count, link, sweep->slack[block]);
     }
 }
 
@@ -372,7 +362,8 @@ static void search_block(const struct sweep *sweep, int part, struct lw_cull *li
 static void search(const struct sweep *sweep, int part, bool seeded, struct nearest *nearest)
 {
     const struct lw_snapshot *world = sweep->query->world;
-    struct lw_cull link = lw_cull_link(&sweep->query->placed->capsule[part], nearest->best.distance.d);
+    struct lw_cull link = sweep->query->placed->cull[part];
+    lw_cull_look(&link, nearest->best.distance.d);
     for (int i = world->bounded; i < world->count; i++)
         (void)improve(sweep, part, i, nearest);
     const int seed = seeded ? -1 : guess(sweep, &link);

@@ -100,6 +100,7 @@ nb::tuple World::nearest(const Input &points, const nb::ndarray<const int64_t, n
             const double *point = points.data() + 3 * (row * parts + part);
             std::copy(point, point + 3, placed.capsule[part].a);
             std::copy(point, point + 3, placed.capsule[part].b);
+            lw_body_mark(&placed, static_cast<int>(part), 0);
         }
         const lw_near_query query = {&body, &placed, &look(), times.data()[row], INFINITY, nullptr};
         lw_near_each(&query, near);
