@@ -44,7 +44,7 @@ enum lw_flag {
 };
 
 // How a law fared in a tick.
-enum lw_law_outcome { LW_LAW_NOT_ASKED, LW_LAW_OK, LW_LAW_NO_NUMBER, LW_LAW_STUCK };
+enum lw_law_outcome { LW_LAW_NOT_ASKED, LW_LAW_OK, LW_LAW_NO_NUMBER, LW_LAW_STUCK, LW_LAW_ASIDE };
 
 // Nearest pair of link and obstacle.
 struct lw_nearest {

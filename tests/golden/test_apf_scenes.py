@@ -10,7 +10,7 @@ import pytest
 import leeway
 
 TOLERANCE = 1e-11
-STUCK = 3  # of joint_command_t
+STUCK, ASIDE = 3, 4  # of joint_command_t
 ORIGINS = {"law.control_points": "joints", "law.rho_rep": 0.15, "law.eta": 0.005}
 FINE = {"law.control_points": "capsules_fine"}
 OFF = {"limits.clearance": "off"}
@@ -134,6 +134,15 @@ def test_a_rollout_finds_the_way_out(root, golden, control_points, stuck_at, sec
     assert arm.clearance.min() > 0.01
     assert arm.self_clearance.min() > 0.01
     assert clearance(arm.q, points_b).min() > room
+
+
+def test_a_motion_aside_is_told(root):
+    arm = run(root, "table", {"law.remedy": "rollout"})
+    aside = np.flatnonzero(arm.outcome == ASIDE)
+    starts = np.flatnonzero(np.diff(aside, prepend=-9) > 1)
+    lengths = np.diff(np.append(starts, len(aside))) / arm.scene.to_dict()["rate_hz"]
+    assert len(lengths) > 0
+    np.testing.assert_allclose(lengths, 1.5, atol=0.01)
 
 
 # --- the paper's cases ---

@@ -207,6 +207,22 @@ def test_requests_become_events(tmp_path: Path) -> None:
     assert a.flag_shares["stopped"] == pytest.approx(11 / 51)
 
 
+def test_being_stuck_and_the_ways_out_become_events(tmp_path: Path) -> None:
+    run = Run()
+    for command in run.commands[10:20]:
+        command.stuck_since_ns, command.deviation = 1, 0.25
+    for command in run.commands[20:30]:
+        command.circulation = [0, 0, 1]
+    for command in run.commands[30:40]:
+        command.law_outcome = command.ASIDE
+    assert texts(analysed(run, tmp_path), "stuck") == [
+        "0.080 the tip is stuck 0.250 m from the goal until 0.152 s",
+        "0.160 way out: circulation about (0, 0, 1)",
+        "0.240 the circulation ends",
+        "0.240 way out: the joints move aside until 0.312 s",
+    ]
+
+
 @pytest.mark.parametrize("echoed", [False, True])
 def test_stop_that_no_command_obeys_is_told(tmp_path: Path, echoed: bool) -> None:
     run = Run()

@@ -68,6 +68,7 @@ static void constants_are_those_of_the_wire(void **state)
     assert_int_equal(LW_LAW_OK, LEEWAY_JOINT_COMMAND_T_OK);
     assert_int_equal(LW_LAW_NO_NUMBER, LEEWAY_JOINT_COMMAND_T_NO_NUMBER);
     assert_int_equal(LW_LAW_STUCK, LEEWAY_JOINT_COMMAND_T_STUCK);
+    assert_int_equal(LW_LAW_ASIDE, LEEWAY_JOINT_COMMAND_T_ASIDE);
     assert_int_equal(LW_WORLD_NONE, LEEWAY_JOINT_COMMAND_T_NONE);
     assert_int_equal(LW_WORLD_OBSTACLES, LEEWAY_JOINT_COMMAND_T_OBSTACLES);
     assert_int_equal(LW_WORLD_HULL, LEEWAY_JOINT_COMMAND_T_HULL);

@@ -17,6 +17,7 @@ from leeway.logs.world import World, WorldLine
 from leeway.status import fault_names
 
 STOPPED, STALE, NOT_FINITE, FOREIGN, CONTACT = 8, 16, 32, 128, 1024
+ASIDE = 4  # law_outcome
 BEFORE, DURING, AFTER = range(3)  # the motion
 _OTHERS_SHOWN = 10  # other sessions of controllers or of plants that are events of their own
 FAULT_S = 1.0  # a status tells the faults of the second before it
@@ -210,6 +211,9 @@ def _stuck_events(motion: Motion) -> Iterator[Event]:
             else "the circulation ends"
         )
         yield Event(float(motion.t[row]), "stuck", text)
+    for first, last in _spans(c.law_outcome == ASIDE):
+        start, end = float(motion.t[first]), float(motion.t[last])
+        yield Event(start, "stuck", f"way out: the joints move aside until {end:.3f} s")
 
 
 # --- processes ---
