@@ -163,8 +163,8 @@ def is_whole(log: Path) -> bool:
     return True
 
 
-def test_a_post_mortem_log_is_equal_but_for_its_first_tick(root: Path, tmp_path: Path) -> None:
-    scene, folder = root / "scenarios" / "c4.yaml", tmp_path / "pm"
+def post_mortem(scene: Path, folder: Path) -> Path | None:
+    """Log of a plant that died in mid-run; None when a fault came before, the machine being busy."""
     listener = Listener()
     with running("leeway-controller", scene, f"--post-mortem={folder}"):
         with running("leeway-simulator", scene) as simulator:
@@ -172,9 +172,16 @@ def test_a_post_mortem_log_is_equal_but_for_its_first_tick(root: Path, tmp_path:
             own = bus.open_bus(bus.resolve_url(None))
             assert bus.send_obstacles(own, None, bus.UPSERT, [(9, (0.2, -0.9, 0.5), 0.1)])
             listener.wait_for("JOINT_COMMAND", lambda c: c.tick > 400)
+            busy = folder.exists()
             simulator.kill()
         wait_until(lambda: any(folder.glob("*.lcm")), 10, "post-mortem log")
     (log,) = folder.glob("*.lcm")
+    return None if busy else log
+
+
+def test_a_post_mortem_log_is_equal_but_for_its_first_tick(root: Path, tmp_path: Path) -> None:
+    attempts = (post_mortem(root / "scenarios" / "c4.yaml", tmp_path / f"{k}") for k in range(3))
+    log = next(filter(None, attempts))
     status, found = verify(log)
     (c,) = found["controllers"]
     # The log begins in mid-run: of its first tick and of being stuck before nothing is known.
