@@ -40,22 +40,25 @@ struct lw_law_reach lw_clearance_reach(const struct lw_guard_input *in, const st
     }
     const double time = braking_time(limits, next);
     const double speed = lw_surroundings_speed(s, body, in->velocity) + faster;
-    double turning = 0;
-    for (int j = 0; j < LW_NJ; j++)
+    double turning = 0, apart = 0;
+    for (int j = 0; j < LW_NJ; j++) {
         turning += next[j];
-    const double way = speed * (time / 2 + in->period_s) + turning * speed * time * time / 4;
+        apart += next[j] * body->lever[j];
+    }
+    const double per_speed = time / 2 + in->period_s + turning * time * time / 4;
     const double coming = obstacle_speed * (time + in->period_s);
-    return (struct lw_law_reach){.obstacles = limits->clearance + way + coming, .self = limits->clearance + 2 * way};
+    return (struct lw_law_reach){.obstacles = limits->clearance + speed * per_speed + coming,
+                                 .self = limits->clearance + apart * per_speed};
 }
 
-// Adds the room of a point of a part that is `ahead` of the nearest point: it moves along n with its link, and what is
-// on the other side, where that is a link, with its own nearest point.
+// Adds the room of a point of a part: it moves along n with its link. The plane stands with the obstacle; between links
+// it turns with the other one, so that what moves both alike changes nothing.
 static void add_room(struct lw_rooms *rooms, const struct lw_near *pair, int part, const double point[3],
                      double clearance)
 {
     const struct lw_distance *d = &pair->distance;
     const bool first = part == pair->part;
-    const double *nearest = first ? d->pa : d->pb, *facing = first ? d->pb : d->pa;
+    const double *nearest = first ? d->pa : d->pb;
     const double r = rooms->around->placed.capsule[part].r;
     double n[3], between[3], other[LW_NJ];
     struct lw_room *room = &rooms->room[rooms->count++];
@@ -65,11 +68,13 @@ static void add_room(struct lw_rooms *rooms, const struct lw_near *pair, int par
     }
     room->room = d->d + lw_vec_dot(n, between) - clearance;
     room->approach = fmax(lw_vec_dot(d->n, pair->velocity), 0);
-    lw_arm_point_effect(rooms->around->frame, rooms->body->part[part].link, point, n, room->gradient);
+    room->fixed_to = 0;
+    room->moved_by = rooms->body->part[part].link;
+    lw_arm_point_effect(rooms->around->frame, room->moved_by, point, n, room->gradient);
     if (pair->obstacle != 0)
         return;
-    const int across = first ? pair->other : pair->part;
-    lw_arm_point_effect(rooms->around->frame, rooms->body->part[across].link, facing, n, other);
+    room->fixed_to = rooms->body->part[first ? pair->other : pair->part].link;
+    lw_arm_point_effect(rooms->around->frame, room->fixed_to, point, n, other);
     for (int j = 0; j < LW_NJ; j++)
         room->gradient[j] -= other[j];
 }
@@ -92,6 +97,16 @@ static void add_rooms(struct lw_rooms *rooms, const struct lw_near *pair, int pa
         add_room(rooms, pair, part, c->b, clearance);
 }
 
+// The part whose ends are kept behind the plane: of two links the shorter one, whose turning about itself takes least.
+// A tool hull has no ends, so it is never that one of two links.
+static int kept_behind(const struct lw_body *body, const struct lw_near *pair)
+{
+    const bool hull = pair->other == body->tool_part && body->tool.kind == LW_TOOL_HULL;
+    if (pair->obstacle != 0 || hull || body->part[pair->part].length <= body->part[pair->other].length)
+        return pair->part;
+    return pair->other;
+}
+
 void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reach, const struct lw_body *body,
                         const struct lw_surroundings *s, struct lw_rooms *rooms)
 {
@@ -104,9 +119,7 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
         const struct lw_near *pair = &s->near.pair[i];
         if (pair->fixed || pair->distance.d > (pair->obstacle != 0 ? reach.obstacles : reach.self))
             continue;
-        add_rooms(rooms, pair, pair->part, limits->clearance);
-        if (pair->obstacle == 0)
-            add_rooms(rooms, pair, pair->other, limits->clearance);
+        add_rooms(rooms, pair, kept_behind(body, pair), limits->clearance);
     }
 }
 
@@ -127,6 +140,20 @@ static double curve(const struct lw_rooms *rooms, const double velocity[LW_NJ], 
     for (int j = 0; j < LW_NJ; j++)
         turning += fabs(velocity[j]);
     return turning * lw_surroundings_speed(rooms->around, rooms->body, velocity) * time * time / 4;
+}
+
+// The same of the points of one link as another one sees them: only the joints between the two turn them.
+static double curve_between(const struct lw_rooms *rooms, const struct lw_room *room, const double velocity[LW_NJ],
+                            double time)
+{
+    const bool ahead = room->fixed_to < room->moved_by;
+    const int first = ahead ? room->fixed_to : room->moved_by, last = ahead ? room->moved_by : room->fixed_to;
+    double turning = 0, speed = 0;
+    for (int j = first; j < last; j++) {
+        turning += fabs(velocity[j]);
+        speed += fabs(velocity[j]) * rooms->body->lever[j];
+    }
+    return rooms->around == NULL ? 0 : turning * speed * time * time / 4;
 }
 
 // What a part of a velocity needs of a room.
@@ -170,9 +197,11 @@ double lw_clearance_part(const struct lw_limits *limits, double period_s, const 
     const double time = braking_time(limits, velocity), bend = curve(rooms, velocity, time);
     double part = 1;
     for (int i = 0; i < rooms->count; i++) {
-        const double closing = closing_speed(&rooms->room[i], velocity);
-        if (closing > 0 || bend > 0)
-            part = fmin(part, part_of(&rooms->room[i], closing, time, period_s, bend));
+        const struct lw_room *room = &rooms->room[i];
+        const double closing = closing_speed(room, velocity);
+        const double bent = room->fixed_to == 0 ? bend : curve_between(rooms, room, velocity, time);
+        if (closing > 0 || bent > 0)
+            part = fmin(part, part_of(room, closing, time, period_s, bent));
     }
     return part;
 }

@@ -16,12 +16,13 @@
 
 #include <stdbool.h> // bool
 
-// A near obstacle pair has a room for each end of the link's axis, a self pair one for each end of both.
-enum { LW_ROOMS_MAX = 4 * LW_NEAR_MAX };
+// A near pair has a room for each end of the axis of one link.
+enum { LW_ROOMS_MAX = 2 * LW_NEAR_MAX };
 
 // What a near pair leaves an end of a link: it may close in on the plane between the two, which bounds what is convex,
 // only so fast that it can still stop.
 struct lw_room {
+    int fixed_to, moved_by; // self pair: links that the plane stands on and that moves; obstacle: fixed_to 0
     double gradient[LW_NJ]; // m/rad, of the end's distance from the plane by the joint positions
     double room;            // m, that distance less the one to keep
     double approach;        // m/s, how fast the obstacle comes by itself, >= 0
@@ -35,8 +36,8 @@ struct lw_rooms {
 };
 
 // Distances within which lw_clearance_command may have something to say: the way of the fastest point of the arm until
-// it rests, and that of the fastest obstacle; between links twice the former. Only limits, period and velocity of *in
-// are looked at.
+// it rests, and that of the fastest obstacle; between links the way that the levers of all joints add up to. Only
+// limits, period and velocity of *in are looked at.
 //   s               in  placed
 //   obstacle_speed  in  m/s
 struct lw_law_reach lw_clearance_reach(const struct lw_guard_input *in, const struct lw_body *body,
@@ -51,7 +52,8 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
 // joint space takes T = max |qd_j| / a_j; with c = -gradient . qd the room has to hold c (T/2 + period), and approach
 // (T + period) more where the obstacle comes by itself. Points of the arm move in curves: with w = sum |qd_j| and v the
 // speed of the fastest point they leave the straight way by at most w v T^2 / 4 until they rest, which every room has
-// to hold as well, also one that is left. A room that is used up is asked for nothing by what leaves it.
+// to hold as well, also one that is left; between links only the joints between the two count, and v is bounded by the
+// levers. A room that is used up is asked for nothing by what leaves it.
 double lw_clearance_part(const struct lw_limits *limits, double period_s, const struct lw_rooms *rooms,
                          const double velocity[LW_NJ]);
 

@@ -341,9 +341,102 @@ static void curved_ways_keep_the_clearance(void **state)
     assert_true(would_touch > 0);
 }
 
+// --- links among one another ---
+
+static struct lw_surroundings folded;
+static struct lw_rooms between_links;
+
+// A folded arm whose nearest links are less than 5 cm apart, and the rooms of that pair alone. False when it is not.
+static bool draw_folded(struct random *random, const struct lw_limits *l, double q[LW_NJ])
+{
+    random_fill(random, -3, 3, q, LW_NJ);
+    assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, q, &folded), LW_OK);
+    folded.near.count = folded.near.needed = 0;
+    lw_near_self(&braked, &folded.placed, 0.05, &folded.near);
+    const struct lw_near *nearest = lw_surroundings_nearest(&folded, true);
+    if (nearest == NULL)
+        return false;
+    folded.near.pair[0] = *nearest;
+    folded.near.count = 1;
+    lw_clearance_rooms(l, (struct lw_law_reach){HUGE_VAL, HUGE_VAL}, &braked, &folded, &between_links);
+    return true;
+}
+
+// Joints that do not lie between two links move both alike: however near the two are, they are free.
+static void what_moves_two_links_alike_is_free(void **state)
+{
+    (void)state;
+    struct random random = {77};
+    const struct lw_limits l = limits(8);
+    int near = 0;
+    lw_body_make(LW_UR5, LW_BODY_CAPSULES, NULL, &braked);
+    for (int n = 0; n < 3000; n++) {
+        double q[LW_NJ], velocity[LW_NJ], command[LW_NJ];
+        if (!draw_folded(&random, &l, q))
+            continue;
+        const struct lw_near *pair = &folded.near.pair[0];
+        random_fill(&random, -3, 3, velocity, LW_NJ);
+        for (int j = braked.part[pair->part].link; j < braked.part[pair->other].link; j++)
+            velocity[j] = 0;
+        near += pair->distance.d < l.clearance;
+        assert_true(between_links.count > 0);
+        assert_near(lw_clearance_part(&l, period_s, &between_links, velocity), 1, 0);
+        const struct lw_guard_input in = {
+            .limits = &l, .period_s = period_s, .q = q, .velocity = velocity, .wish = velocity};
+        (void)lw_clearance_command(&in, &between_links, command);
+        assert_same_bits(command, velocity, sizeof command);
+    }
+    assert_true(near > 100);
+}
+
+// Smallest distance of a pair while the arm brakes along a straight line in joint space.
+static double smallest_between(const struct lw_limits *l, const struct lw_near *pair, const double q[LW_NJ],
+                               const double velocity[LW_NJ])
+{
+    static struct lw_surroundings later;
+    struct lw_distance distance;
+    double at[LW_NJ], time = 0, smallest = HUGE_VAL;
+    memcpy(at, q, sizeof at);
+    for (int j = 0; j < LW_NJ; j++)
+        time = fmax(time, fabs(velocity[j]) / l->acceleration[j]);
+    for (int k = 0; k * period_s < time; k++) {
+        for (int j = 0; j < LW_NJ; j++)
+            at[j] += period_s * velocity[j] * (1 - k * period_s / time);
+        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, at, &later), LW_OK);
+        lw_distance_capsules(&later.placed.capsule[pair->part], &later.placed.capsule[pair->other], &distance);
+        smallest = fmin(smallest, distance.d);
+    }
+    return smallest;
+}
+
+// Braked from an allowed velocity no two links come nearer than the clearance; from the whole velocity many would.
+static void links_keep_the_clearance_from_each_other(void **state)
+{
+    (void)state;
+    struct random random = {78};
+    const struct lw_limits l = limits(8);
+    int cut = 0, would_touch = 0;
+    lw_body_make(LW_UR5, LW_BODY_CAPSULES, NULL, &braked);
+    for (int n = 0; n < 6000; n++) {
+        double q[LW_NJ], velocity[LW_NJ], allowed[LW_NJ];
+        random_fill(&random, -3, 3, velocity, LW_NJ);
+        if (!draw_folded(&random, &l, q) || folded.near.pair[0].distance.d < 0.012)
+            continue;
+        const double part = lw_clearance_part(&l, period_s, &between_links, velocity);
+        for (int j = 0; j < LW_NJ; j++)
+            allowed[j] = part * velocity[j];
+        cut += part < 1;
+        would_touch += smallest_between(&l, &folded.near.pair[0], q, velocity) < l.clearance;
+        assert_true(smallest_between(&l, &folded.near.pair[0], q, allowed) > l.clearance - 1e-9);
+    }
+    assert_true(cut > 100 && would_touch > 100);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_part_is_the_largest_that_can_be_braked),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_moves_two_links_alike_is_free),
+                                       cmocka_unit_test(links_keep_the_clearance_from_each_other),
+                                       cmocka_unit_test(the_part_is_the_largest_that_can_be_braked),
                                        cmocka_unit_test(leaving_is_free),
                                        cmocka_unit_test(a_wall_is_never_reached_and_always_approached),
                                        cmocka_unit_test(without_rooms_nothing_changes),
