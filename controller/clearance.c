@@ -15,7 +15,8 @@
 #include <string.h> // memcpy
 
 enum { SWEEPS = 10, HALVINGS = 30 };
-static const double rounding = 1e-9; // a wish scaled to its part need not come out as wholly allowed
+static const double rounding = 1e-9;        // a wish scaled to its part need not come out as wholly allowed
+static const double rounding_lever = 1e-12; // m/rad, what moves less does not move
 
 // Time to come to rest along a straight line in joint space.
 static double braking_time(const struct lw_limits *limits, const double velocity[LW_NJ])
@@ -123,12 +124,15 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
     }
 }
 
+// Zero where rounding alone closes in: who goes along a room that is used up must not be stopped by it.
 static double closing_speed(const struct lw_room *room, const double velocity[LW_NJ])
 {
-    double closing = 0;
-    for (int j = 0; j < LW_NJ; j++)
+    double closing = 0, turning = 0;
+    for (int j = 0; j < LW_NJ; j++) {
         closing -= room->gradient[j] * velocity[j];
-    return closing;
+        turning += fabs(velocity[j]);
+    }
+    return fabs(closing) > rounding_lever * turning ? closing : 0;
 }
 
 // How far points leave their straight way until they rest.
@@ -240,15 +244,16 @@ unsigned lw_clearance_command(const struct lw_guard_input *in, const struct lw_r
     static const double rest[LW_NJ] = {0};
     struct lw_guard_input scaled = *in;
     double wish[LW_NJ];
-    memcpy(wish, in->wish, sizeof wish);
-    scaled.wish = wish;
     unsigned flags = 0;
-    if (rooms->count > 0 && lw_all_finite(wish, LW_NJ)) {
+    if (rooms->count > 0) {
+        // Within the other limits first: who wishes for more than the joints can would be taken to brake for longer.
+        flags = lw_guard_wish(in, wish);
         const bool slid = slide(in, rooms, wish);
         const double part = lw_clearance_part(in->limits, in->period_s, rooms, wish);
         for (int j = 0; part < 1 && j < LW_NJ; j++)
             wish[j] *= part;
-        flags = slid || part < 1 ? LW_LIMIT_CLEARANCE : 0u;
+        flags |= slid || part < 1 ? LW_LIMIT_CLEARANCE : 0u;
+        scaled.wish = wish;
     }
     flags |= lw_guard_shape(&scaled, command);
     if (rooms->count == 0 || lw_clearance_part(in->limits, in->period_s, rooms, command) > 1 - rounding)

@@ -57,8 +57,8 @@ void lw_clearance_rooms(const struct lw_limits *limits, struct lw_law_reach reac
 double lw_clearance_part(const struct lw_limits *limits, double period_s, const struct lw_rooms *rooms,
                          const double velocity[LW_NJ]);
 
-// lw_guard_shape with the clearance: the wish is scaled to its allowed part; where the acceleration limits would still
-// lead too near, the arm is braked along its way instead. Adds LW_LIMIT_CLEARANCE.
+// lw_guard_shape with the clearance: the wish, within the other limits, is scaled to its allowed part; where the
+// acceleration limits would still lead too near, the arm is braked along its way instead. Adds LW_LIMIT_CLEARANCE.
 unsigned lw_clearance_command(const struct lw_guard_input *in, const struct lw_rooms *rooms, double command[LW_NJ]);
 
 #endif

@@ -44,14 +44,16 @@ static double part_within(double way, double limit)
     return fabs(way) > limit ? limit / fabs(way) : 1.0;
 }
 
-// Range of velocities of a joint from which its position range can still be kept.
-static void position_bounds(const struct lw_limits *limits, double period_s, const double q[LW_NJ], double low[LW_NJ],
-                            double high[LW_NJ])
+// Range of velocities of each joint from which its position range can still be kept; any where nobody knows the
+// positions.
+static void position_bounds(const struct lw_guard_input *in, double low[LW_NJ], double high[LW_NJ])
 {
+    const struct lw_limits *limits = in->limits;
+    const bool known = lw_all_finite(in->q, LW_NJ);
     for (int j = 0; j < LW_NJ; j++) {
-        const double a = limits->acceleration[j];
-        low[j] = -lw_guard_braking_velocity(q[j] - limits->position_min[j], a, period_s);
-        high[j] = lw_guard_braking_velocity(limits->position_max[j] - q[j], a, period_s);
+        const double a = limits->acceleration[j], q = in->q[j];
+        low[j] = known ? -lw_guard_braking_velocity(q - limits->position_min[j], a, in->period_s) : -HUGE_VAL;
+        high[j] = known ? lw_guard_braking_velocity(limits->position_max[j] - q, a, in->period_s) : HUGE_VAL;
     }
 }
 
@@ -101,30 +103,35 @@ static void reachable_bounds(const struct lw_limits *limits, double period_s, co
     }
 }
 
+// The wish within position and velocity limits; low and high are the former. Returns flags.
+static unsigned shape_wish(const struct lw_guard_input *in, double low[LW_NJ], double high[LW_NJ], double target[LW_NJ])
+{
+    // Finite first: a NaN that reaches a min or max becomes full speed.
+    const bool finite = lw_all_finite(in->q, LW_NJ) && lw_all_finite(in->wish, LW_NJ);
+    unsigned flags = finite ? 0u : LW_NOT_FINITE;
+    for (int j = 0; j < LW_NJ; j++)
+        target[j] = finite ? in->wish[j] : 0.0;
+
+    // Position, then velocity: both shape the wish itself.
+    position_bounds(in, low, high);
+    if (clamp_each(low, high, target))
+        flags |= LW_LIMIT_POSITION;
+    if (limit_velocity(in->limits, target))
+        flags |= LW_LIMIT_VELOCITY;
+    return flags;
+}
+
+unsigned lw_guard_wish(const struct lw_guard_input *in, double target[LW_NJ])
+{
+    double low[LW_NJ], high[LW_NJ];
+    return shape_wish(in, low, high, target);
+}
+
 unsigned lw_guard_shape(const struct lw_guard_input *in, double command[LW_NJ])
 {
     const struct lw_limits *limits = in->limits;
-    unsigned flags = 0;
-    double target[LW_NJ] = {0}, low[LW_NJ], high[LW_NJ];
-
-    // Finite first: a NaN that reaches a min or max becomes full speed.
-    const bool q_finite = lw_all_finite(in->q, LW_NJ);
-    if (q_finite && lw_all_finite(in->wish, LW_NJ))
-        memcpy(target, in->wish, sizeof target);
-    else
-        flags |= LW_NOT_FINITE;
-
-    // Position, then velocity: both shape the wish itself.
-    for (int j = 0; j < LW_NJ; j++) {
-        low[j] = -HUGE_VAL;
-        high[j] = HUGE_VAL;
-    }
-    if (q_finite)
-        position_bounds(limits, in->period_s, in->q, low, high);
-    if (clamp_each(low, high, target))
-        flags |= LW_LIMIT_POSITION;
-    if (limit_velocity(limits, target))
-        flags |= LW_LIMIT_VELOCITY;
+    double target[LW_NJ], low[LW_NJ], high[LW_NJ];
+    unsigned flags = shape_wish(in, low, high, target);
 
     // Acceleration; where the common scale brakes a joint too little for its range, that joint goes first.
     if (limit_acceleration(limits, in->period_s, in->velocity, target))

@@ -29,6 +29,10 @@ struct lw_guard_input {
 // Returns the set of enum lw_flag that shaped the command. Cost: fixed.
 unsigned lw_guard_shape(const struct lw_guard_input *in, double command[LW_NJ]);
 
+// The first three of these: the wish within position and velocity limits, whatever the velocity in force.
+//   target  out  [6] rad/s, finite; may be in->wish
+unsigned lw_guard_wish(const struct lw_guard_input *in, double target[LW_NJ]);
+
 // Fastest velocity (rad/s) from which a joint can come to rest within `room` (rad) when each tick moves it by
 // velocity * period_s and may lower the velocity by acceleration * period_s.
 double lw_guard_braking_velocity(double room, double acceleration, double period_s);
