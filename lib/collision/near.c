@@ -277,13 +277,13 @@ void lw_near_self(const struct lw_body *body, const struct lw_placed *placed, do
 // A search for the nearest obstacle, of one part or of all.
 struct nearest {
     struct lw_near best; // so far; obstacle 0: its d is where to look at most
-    int index;           // of its obstacle
+    int index;           // of its obstacle; -1 = none
 };
 
 static struct nearest nothing(int part, double d_max)
 {
     return (struct nearest){
-        .best = {.distance = {.d = d_max, .flags = LW_DISTANCE_NO_NORMAL}, .part = part, .other = -1}};
+        .best = {.distance = {.d = d_max, .flags = LW_DISTANCE_NO_NORMAL}, .part = part, .other = -1}, .index = -1};
 }
 
 // Of equally near pairs the first part's, and of one part's the one with the lowest id.

@@ -250,12 +250,40 @@ static void the_normal_is_the_gradient(void **state)
         assert_true(checked[k] > 900);
 }
 
+// An obstacle that is no more hides no other, wherever the two stand in the snapshot.
+static void an_expired_obstacle_hides_no_other(void **state)
+{
+    (void)state;
+    struct near_rig *rig = near_rig(86);
+    int nearer = 0;
+    lw_body_make(LW_UR10, LW_BODY_CAPSULES, NULL, &rig->body);
+    for (int n = 0; n < 200; n++) {
+        struct lw_near smallest, each[LW_BODY_MAX];
+        rig->count = 0;
+        rig_random_pose(rig, LW_UR10);
+        const struct told *living = rig_tell(rig, LW_SPHERE, 2);
+        struct told *expired = rig_tell(rig, LW_SPHERE, 2);
+        rig_build(rig, &rig->world);
+        const struct lw_near_query query = {
+            .body = &rig->body, .placed = &rig->placed, .world = &rig->world, .time_ns = SECOND, .d_max = HUGE_VAL};
+        lw_near_smallest(&query, &smallest);
+        nearer += smallest.obstacle == expired->id;
+        expired->motion.expires_ns = SECOND;
+        rig_build(rig, &rig->world);
+        lw_near_smallest(&query, &smallest);
+        lw_near_each(&query, each);
+        assert_int_equal(smallest.obstacle, living->id);
+        for (int part = 0; part < rig->body.count; part++)
+            assert_int_equal(each[part].obstacle, living->id);
+    }
+    assert_true(nearer > 50);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(later_is_as_built_anew),
-        cmocka_unit_test(a_mixed_world_changes_with_time),
-        cmocka_unit_test(velocity_without_a_time),
+        cmocka_unit_test(an_expired_obstacle_hides_no_other), cmocka_unit_test(later_is_as_built_anew),
+        cmocka_unit_test(a_mixed_world_changes_with_time),    cmocka_unit_test(velocity_without_a_time),
         cmocka_unit_test(the_normal_is_the_gradient),
     };
     return cmocka_run_group_tests_name("near_motion", tests, NULL, NULL);
