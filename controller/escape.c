@@ -137,6 +137,9 @@ static void decide(struct lw_escape *escape, const struct lw_escape_now *now)
     memcpy(escape->circulation, rollout->best_way.circulation, sizeof escape->circulation);
     memcpy(escape->aside, rollout->best_way.aside, sizeof escape->aside);
     escape->aside_until_ns = rollout->best_way.moves_aside ? now->tick.time_ns + aside_ns : 0;
+    // To go on as it is begins nothing anew, unless that leads somewhere.
+    if (rollout->best_candidate == 0 && rollout->best > now->deviation - 2 * worth_m)
+        return;
     lw_stuck_reset(&escape->stuck);
     escape->nearest = now->deviation;
     escape->nearest_ns = now->tick.time_ns;
@@ -150,10 +153,11 @@ static void roll_on(struct lw_escape *escape, const struct lw_escape_model *mode
         const double deviation = roll(rollout, model, now);
         if (++rollout->steps < STEPS)
             continue;
-        // Another way has to be worth leaving this one.
+        // Another way has to be worth leaving this one; decide() takes that off again.
         const double score = rollout->candidate == 0 ? deviation - worth_m : deviation;
         if (score < rollout->best) {
             rollout->best = score;
+            rollout->best_candidate = rollout->candidate;
             rollout->best_way = rollout->way;
         }
         if (rollout->candidate + 1 < CANDIDATES)

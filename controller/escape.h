@@ -51,7 +51,9 @@ struct lw_rollout {
     double from_q[LW_NJ], from_velocity[LW_NJ]; // where all candidates start
     double q[LW_NJ], velocity[LW_NJ];           // where this one is
     struct lw_way_out way;                      // of this candidate
-    double best;                                // m, deviation at the end of the best candidate so far
+    double best;                                // m, deviation at the end of the best candidate so far, of the first
+                                                // one less what another has to be better by
+    int best_candidate;
     struct lw_way_out best_way;
 };
 

@@ -255,9 +255,30 @@ static void it_ends_at_the_goal(void **state)
     assert_int_equal(rig.escape.attempts, 1);
 }
 
+// At its nearest to a goal out of reach the arm is stuck, and stays so while it stands: a way that leads nowhere is not
+// taken, and begins nothing anew.
+static void out_of_reach_it_is_stuck_for_good(void **state)
+{
+    (void)state;
+    struct rig rig = scene_b(LW_REMEDY_ROLLOUT, 8 * ms);
+    int standing = 0;
+    put_points(NULL, 0);
+    memcpy(rig.goal, (double[3]){1, 0, 0.4}, sizeof rig.goal);
+    for (int k = 0; k < 40 * 125; k++) {
+        const double before = rig.deviation;
+        go(&rig);
+        standing = k > 0 && fabs(rig.deviation - before) < 1e-5 ? standing + 1 : 0;
+        if (standing > 125)
+            assert_true(rig.stuck);
+    }
+    assert_true(standing > 1000);
+    assert_true(rig.escape.attempts > 5);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(roll_outs_lead_out_of_scene_b),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(out_of_reach_it_is_stuck_for_good),
+                                       cmocka_unit_test(roll_outs_lead_out_of_scene_b),
                                        cmocka_unit_test(the_vortex_is_always_on),
                                        cmocka_unit_test(a_tick_looks_ahead_a_bounded_number_of_steps),
                                        cmocka_unit_test(nothing_is_done_where_nothing_helps),
