@@ -79,7 +79,8 @@ void lw_escape_pause(struct lw_escape *escape);
 const double *lw_escape_aside(const struct lw_escape *escape, int64_t time_ns);
 
 // One tick: notes the deviation, rolls out, decides. The circulation in force afterwards is escape->circulation.
-// Returns whether the tip is stuck. Cost: law and guard once for every 50 us of the period, nothing while it moves on.
+// Returns whether the tip is stuck. Cost: law and guard once for every 50 us of the period, or for as
+// many times that as 64 near pairs are begun, nothing while it moves on.
 bool lw_escape_step(struct lw_escape *escape, const struct lw_escape_model *model, const struct lw_escape_now *now);
 
 #endif

@@ -18,12 +18,14 @@ static const int64_t ms = 1000000;
 static struct lw_snapshot world;
 static struct lw_surroundings around;
 static struct lw_rooms rooms;
-static int law_calls;
+static int law_calls, law_work, law_last;
 
-// The law of the product, counted.
+// The law of the product, counted, and what it costs by the near pairs it sees.
 static void counted_step(const struct lw_law_params *params, const struct lw_law_input *in, double qd[LW_NJ])
 {
     law_calls++;
+    law_last = 1 + in->around->near.count / 64;
+    law_work += law_last;
     lw_apf_law.step(params, in, qd);
 }
 
@@ -52,10 +54,11 @@ static void put_points(const double (*at)[3], int count)
     lw_snapshot_end(&world);
 }
 
+static const double scene_b_points[5][3] = {
+    {-.22, -.5, .14}, {-.26, -.65, .14}, {-.18, -.36, .14}, {-.22, -.5, .29}, {-.22, -.5, -.01}};
+
 static struct rig scene_b(int remedy, int64_t period_ns)
 {
-    static const double at[5][3] = {
-        {-.22, -.5, .14}, {-.26, -.65, .14}, {-.18, -.36, .14}, {-.22, -.5, .29}, {-.22, -.5, -.01}};
     struct rig rig = {.law = lw_apf_law,
                       .params = {.apf = {.attraction = LW_ATTRACTION_CONE_PAR,
                                          .gamma = 2,
@@ -80,7 +83,7 @@ static struct rig scene_b(int remedy, int64_t period_ns)
     }
     lw_body_make(LW_UR5, LW_BODY_JOINTS, NULL, &rig.body);
     lw_escape_reset(&rig.escape, &rig.params.remedy);
-    put_points(at, 5);
+    put_points(scene_b_points, 5);
     return rig;
 }
 
@@ -194,6 +197,27 @@ static void a_tick_looks_ahead_a_bounded_number_of_steps(void **state)
     }
 }
 
+// In a crowd, each point of scene B forty times as weak and forty times there, a step counts for more.
+static void in_a_crowd_it_looks_ahead_by_fewer_steps(void **state)
+{
+    (void)state;
+    static double crowd[200][3];
+    struct rig rig = scene_b(LW_REMEDY_ROLLOUT, 8 * ms);
+    for (int i = 0; i < 200; i++)
+        memcpy(crowd[i], scene_b_points[i % 5], sizeof crowd[i]);
+    put_points((const double (*)[3])crowd, 200);
+    rig.params.apf.eta /= 40;
+    int most = 0;
+    for (int k = 0; k < 60 * 125 && rig.escape.attempts == 0; k++) {
+        law_calls = law_work = law_last = 0;
+        go(&rig);
+        assert_true(law_work - law_last < 160);
+        most = law_last > most ? law_last : most;
+    }
+    assert_int_equal(rig.escape.attempts, 1);
+    assert_true(most > 3);
+}
+
 // Where no way helps there is no circulation in the end, and it tries again ever later.
 static void nothing_is_done_where_nothing_helps(void **state)
 {
@@ -281,6 +305,7 @@ int main(void)
                                        cmocka_unit_test(roll_outs_lead_out_of_scene_b),
                                        cmocka_unit_test(the_vortex_is_always_on),
                                        cmocka_unit_test(a_tick_looks_ahead_a_bounded_number_of_steps),
+                                       cmocka_unit_test(in_a_crowd_it_looks_ahead_by_fewer_steps),
                                        cmocka_unit_test(nothing_is_done_where_nothing_helps),
                                        cmocka_unit_test(brakes_keep_and_goals_forget),
                                        cmocka_unit_test(it_ends_at_the_goal)};
