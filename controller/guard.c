@@ -30,7 +30,7 @@ double lw_guard_braking_velocity(double room, double acceleration, double period
 {
     if (room <= 0)
         return 0;
-    if (isinf(acceleration))
+    if (isinf(acceleration) || isinf(room))
         return room / period_s;
     // Braking from v takes k more ticks after this one and the way T ((k+1) v - k(k+1)/2 aT).
     const double step = acceleration * period_s;

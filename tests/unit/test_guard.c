@@ -111,6 +111,21 @@ static void an_allowed_wish_passes_untouched(void **state)
     assert_same_bits(command, wish, sizeof wish);
 }
 
+// Limits that are off, the range too, shape nothing; one that is not still holds.
+static void infinite_limits_are_off(void **state)
+{
+    (void)state;
+    const double wish[LW_NJ] = {1e9, -1e9, 0.5, -0.5, 0, 1};
+    double command[LW_NJ];
+    const struct rig off = still_rig(HUGE_VAL, HUGE_VAL, HUGE_VAL);
+    assert_int_equal(shape(&off, wish, command), 0);
+    assert_same_bits(command, wish, sizeof wish);
+    struct rig braked = still_rig(HUGE_VAL, HUGE_VAL, 8);
+    assert_int_equal(go(&braked, wish), LW_LIMIT_ACCELERATION);
+    assert_near(braked.velocity[0], 8 * braked.period_s, 1e-12);
+    assert_near(braked.velocity[1], -8 * braked.period_s, 1e-12);
+}
+
 // A wish exactly at a limit is allowed; the next number beyond it is not, and then only that limit's flag is up.
 static void limits_themselves_are_allowed(void **state)
 {
@@ -367,6 +382,7 @@ int main(void)
         cmocka_unit_test(braking_velocity_of_whole_steps_is_whole),
         cmocka_unit_test(braking_velocity_at_its_ends),
         cmocka_unit_test(an_allowed_wish_passes_untouched),
+        cmocka_unit_test(infinite_limits_are_off),
         cmocka_unit_test(limits_themselves_are_allowed),
         cmocka_unit_test(speed_limits_keep_the_direction),
         cmocka_unit_test(acceleration_limits_keep_the_direction_of_the_step),
