@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from log_maker import CONTROLLER, SOURCE, Run, obstacles, scene
+from log_maker import CONTROLLER, SOURCE, Run, obstacles, scene, see
 from typer.testing import CliRunner
 
 from leeway.cli import app
@@ -180,7 +180,7 @@ def test_page_is_self_contained_and_whole(tmp_path: Path) -> None:
     ]
     assert len(svgs) == len(PICTURES)
     for svg in svgs:
-        assert not re.search(rb'(href|src)="(?!#)', svg)
+        assert not re.search(rb'(href|src)="(?!#|data:)', svg)
     assert {path.name for path in page.parent.glob("*.png")} == {
         f"test_{name}.png" for name in PICTURES
     }
@@ -243,6 +243,31 @@ def test_view_holds_at_most_400_frames_and_the_last_tick(tmp_path: Path) -> None
     assert view["arm"][-1] == pytest.approx(a.points[-1].ravel(), abs=1e-4)
     assert [len(view["worlds"][k]) for k in (view["world"][0], view["world"][-1])] == [1, 2]
     assert view["goals"][view["goal"][0]] == [0.5, -0.6, 0.5]
+
+
+def test_a_crowd_that_trembles_weighs_little_and_stands_where_it_was_told(tmp_path: Path) -> None:
+    # 128 boxes, told anew 40 times, each time elsewhere, as a sensor with noise tells them.
+    run, random = Run(ticks=81), np.random.default_rng(5)
+    told = 0
+    for row in range(1, 81, 2):
+        for first in range(100, 228, 32):
+            told += 1
+            at = [(n, (*random.uniform(0.4, 1.2, 3),), 0.0) for n in range(first, first + 32)]
+            message = obstacles(SOURCE, told, 0, at)
+            for slot in message.o:
+                slot.shape, slot.size = slot.BOX, [0.05, 0.02, 0.03]
+                slot.quat = [np.cos(slot.id), np.sin(slot.id), 0, 0]
+            run.inserted.setdefault(row, []).append(("OBSTACLES", message))
+        see(run, slice(row, None), SOURCE, told)
+    a = analysed(tmp_path, run)
+    page = write_report([a], tmp_path / "out")
+    assert page.stat().st_size < 1_500_000
+    view = page_data(page.read_text(encoding="utf-8"))["test"]
+    forms, shown = view["forms"], view["worlds"][view["world"][-1]]
+    assert len(forms) == 129
+    for o, (number, form, *p) in zip(a.world.worlds[-1], shown, strict=True):
+        assert number == o.id
+        assert np.array(forms[form]["c"]) + p == pytest.approx(o.core, abs=1.1e-4)
 
 
 def test_several_runs_are_compared_and_told_apart(tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ class _Writer:
         figure.savefig(self.folder / file, dpi=PNG_DPI)
         figure.set_layout_engine("none")  # it stays as laid out: the second drawing is faster
         buffer = io.BytesIO()
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
+        figure.savefig(buffer, format="svg", dpi=PNG_DPI, metadata={"Date": None})
         url = "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
         return Picture(file, alt, url)
 
@@ -178,12 +178,13 @@ def _comparison(runs: list[tuple[str, Analysis]], write: _Writer) -> dict[str, P
 def view_data(a: Analysis) -> dict[str, Any]:
     """Return what the 3-D view moves: at most 400 frames, with the last tick among them.
 
-    Each solid has its core points c, which a ball of radius r sweeps; planes have corners.
+    A solid is [id, number of its form, x, y, z]. A form has core points c, from there, which a ball
+    of radius r sweeps; planes have corners. Solids that look alike share one, in all frames.
 
     Returns
     -------
     dict
-        t (k) s, arm (k, 18) m, world (k) and goal (k) indices, worlds, goals, rho.
+        t (k) s, arm (k, 18) m, world (k) and goal (k) indices, worlds, forms, goals, rho.
     """
     most = max((len(world) for world in a.world.worlds), default=0)
     frames = int(np.clip(SOLIDS_MAX // max(most, 1), FRAMES_MIN, FRAMES_MAX))
@@ -191,34 +192,33 @@ def view_data(a: Analysis) -> dict[str, Any]:
     rows = rows[np.isfinite(a.points[rows]).all(axis=(1, 2))]
     goals, goal_index = np.unique(a.goal[rows], axis=0, return_inverse=True)
     shown, world_index = np.unique(a.world.index[rows], return_inverse=True)
-    worlds = [[_solid(o) for o in a.world.worlds[k]] for k in shown]
+    forms: dict[str, int] = {}
+    worlds = [[_solid(o, forms) for o in a.world.worlds[k]] for k in shown]
     return {
         "t": _rounded(a.t[rows]),
         "arm": [_rounded(points.ravel()) for points in a.points[rows]],
         "world": world_index.ravel().tolist(),
         "worlds": worlds,
+        "forms": [json.loads(form) for form in forms],
         "goal": goal_index.ravel().tolist(),
         "goals": [_rounded(goal) for goal in goals],
         "rho": a.rho,
     }
 
 
-def _solid(o: Obstacle) -> dict[str, Any]:
-    """Return what the 3-D view draws of an obstacle."""
+def _solid(o: Obstacle, forms: dict[str, int]) -> list[float]:
+    """Return what the 3-D view draws of an obstacle; a form not seen before joins the others."""
     plane = o.shape == HALFSPACE
     half = np.full(3, PLANE_HALF)
     core = polygon_in(o, -half, half) if plane else o.core
-    solid = {
-        "id": o.id,
-        "p": _rounded(np.array(o.p)),
-        "r": round(o.radius, DIGITS),
-        "c": [_rounded(point) for point in core],
-    }
-    return solid | ({"plane": True} if plane else {})
+    points = [_rounded(point) for point in core - np.array(o.p)]
+    form = {"r": round(o.radius, DIGITS), "c": points} | ({"plane": True} if plane else {})
+    number = forms.setdefault(json.dumps(form), len(forms))
+    return [o.id, number, *_rounded(np.array(o.p))]
 
 
 def _rounded(values: np.ndarray[Any, np.dtype[np.float64]]) -> list[float]:
-    return [round(float(v), DIGITS) for v in values]
+    return [round(float(v), DIGITS) + 0.0 for v in values]  # no -0.0
 
 
 def _flat(value: Any, key: str = "") -> Iterator[tuple[str, str]]:

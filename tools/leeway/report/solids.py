@@ -133,4 +133,5 @@ def _add(
         polygons, facecolors=colour, edgecolors=colour, alpha=alpha, shade=shade, zorder=zorder
     )
     collection.set_linewidth(0)
+    collection.set_rasterized(True)  # hundreds of polygons weigh more than their picture
     axes.add_collection3d(collection)
