@@ -115,7 +115,7 @@ def register(app: typer.Typer, send: Send) -> None:
         common: Common,
     ) -> None:
         """Put an obstacle elsewhere; its shape stays, and its turn unless --rpy says another."""
-        _tell(_moved(_known(number, common), number, at, radius, motion), "to", send, common)
+        _tell(_moved(_known(number, common), at, radius, motion), "to", send, common)
 
     @command(group, "remove", "leeway obstacle remove 7")
     def remove(number: IdArgument, *, common: Common) -> None:
@@ -187,11 +187,15 @@ def _set_motion(draft: "Draft", motion: Motion) -> None:
         draft.valid_for_ms = duration_ms(motion.valid_for)
 
 
-def _known(number: int, common: Common) -> "Obstacle | None":
-    """Return what the controller knows of an id; None in lockstep, where it does not tell."""
+def _known(number: int, common: Common) -> "Obstacle":
+    """Return what the controller knows of an id."""
     found, _ = _list(common)
     if found is None:
-        return None
+        fail(
+            f"obstacle {number}: no controller tells what it is, in lockstep none does: is "
+            "leeway-controller running in real time on this bus (same --lcm-url, same --name)? "
+            f"Or give it anew: leeway obstacle add SHAPE --id {number} ..."
+        )
     known = {o.id: o for o in found}
     if number not in known:
         there = ", ".join(map(str, sorted(known)[:20])) or "none"
@@ -199,14 +203,10 @@ def _known(number: int, common: Common) -> "Obstacle | None":
     return known[number]
 
 
-def _moved(
-    old: "Obstacle | None", number: int, at: Triple, radius: float | None, motion: Motion
-) -> "Draft":
+def _moved(old: "Obstacle", at: Triple, radius: float | None, motion: Motion) -> "Draft":
     from leeway.obstacles import Draft, Refused
 
-    draft = Draft(number, 0, at)
-    if old is not None:
-        draft = Draft(number, old.shape, at, old.quat, old.radius, old.size)
+    draft = Draft(old.id, old.shape, at, old.quat, old.radius, old.size)
     if radius is not None:
         draft.radius = radius
     try:

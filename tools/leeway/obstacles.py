@@ -51,7 +51,9 @@ def duration_ms(text: str) -> int:
     factor = {"ms": 1.0, "s": 1e3, "min": 6e4}[(match and match[2]) or "s"]
     value = round(float(match[1]) * factor) if match else 0
     if not 1 <= value < 1 << 31:
-        raise Refused(f"expected a time of 1 ms or more, as 5s, 500ms or 2min, found {text!r}")
+        raise Refused(
+            f"expected a time from 1 ms to 35791 min, as 5s, 500ms or 2min, found {text!r}"
+        )
     return value
 
 
@@ -68,7 +70,11 @@ def vertices(text: str) -> list[Vector]:
     except OSError:  # too long for a name
         is_file = False
     if is_file:
-        lines = [line.partition("#")[0] for line in Path(text).read_text().splitlines()]
+        try:
+            whole = Path(text).read_text()
+        except UnicodeDecodeError:
+            raise Refused(f"vertices: expected a text of points x,y,z, found {text}") from None
+        lines = [line.partition("#")[0] for line in whole.splitlines()]
         points = [line.replace(",", " ").split() for line in lines if line.strip()]
     else:
         points = [point.split(",") for point in text.split()]
@@ -170,12 +176,15 @@ class Draft:
 
     def _check(self) -> None:
         if not 0 < self.number < 1 << 31:
-            raise Refused(f"expected an id > 0, found {self.number}")
+            raise Refused(f"expected an id from 1 to {(1 << 31) - 1}, found {self.number}")
         if not (math.isfinite(self.radius) and 0 <= self.radius <= LIMIT):
             raise Refused(f"expected a radius from 0 to {LIMIT:g} (m), found {self.radius:g}")
+        if self.shape == wire.obstacle_t.CAPSULE and not 0 <= self.size[0] <= LIMIT:
+            found = 2 * self.size[0]
+            raise Refused(f"expected a length from 0 to {2 * LIMIT:g} (m), found {found:g}")
         if self.shape == wire.obstacle_t.BOX and not all(0 < v <= LIMIT for v in self.size):
             edges = tuple(2 * v for v in self.size)
-            raise Refused(f"expected three edges > 0 (m), found {edges}")
+            raise Refused(f"expected three edges > 0, to {2 * LIMIT:g} (m), found {edges}")
         limited = {"at": self.p, "velocity": self.v, "omega": self.omega, "vertices": self.vertices}
         for name, values in limited.items():
             if not np.all(np.abs(np.array(values)) <= LIMIT):
