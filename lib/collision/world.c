@@ -163,10 +163,10 @@ static void drop(struct lw_world *world, int at)
 static int append(struct lw_world *world, int id)
 {
     const int at = world->count;
-    const unsigned slot = slot_of(world, id);
+    // NOLINTNEXTLINE(clang-analyzer-security.ArrayBound): only an entry is dropped, so the count is never negative
     world->entry[at] = (struct lw_world_entry){.obstacle = {.id = id}};
     world->owner[at] = 0;
-    world->slot[slot] = ++world->count;
+    world->slot[slot_of(world, id)] = world->count = at + 1;
     return at;
 }
 
@@ -212,13 +212,33 @@ static bool adds(const struct lw_obstacle_change *change)
     return change->op == LW_UPSERT || change->op == LW_REPLACE;
 }
 
-// Whether an entry goes when it is not named: its own source replaces all it has, or says that its time is over.
+static bool names(const struct lw_obstacle_change *change, int id)
+{
+    for (int i = 0; i < change->count; i++)
+        if (change->obstacle[i].id == id)
+            return true;
+    return false;
+}
+
+// Whether the time of an entry is over when the change was told.
+static bool is_over(const struct lw_world *world, const struct lw_obstacle_change *change, int at)
+{
+    return world->expires_ns[at] != 0 && change->time_ns != 0 && world->expires_ns[at] <= change->time_ns;
+}
+
+// Whether an entry that is not named goes: its own source replaces all it has, or says that its time is over.
 static bool goes(const struct lw_world *world, const struct lw_obstacle_change *change, int at)
 {
-    if (world->owner[at] != change->stamp.session)
-        return false;
-    const int64_t expires_ns = world->expires_ns[at];
-    return change->op == LW_REPLACE || (expires_ns != 0 && change->time_ns != 0 && expires_ns <= change->time_ns);
+    return world->owner[at] == change->stamp.session && (change->op == LW_REPLACE || is_over(world, change, at)) &&
+           !names(change, world->entry[at].obstacle.id);
+}
+
+// Whether an entry that is not named may lose its place: its source may have fallen silent. Whoever says that
+// it was over a year ago goes by another clock, as that of the calendar.
+static bool yields(const struct lw_world *world, const struct lw_obstacle_change *change, int at)
+{
+    return is_over(world, change, at) && change->time_ns - world->expires_ns[at] < INT64_C(31536000000000000) &&
+           !names(change, world->entry[at].obstacle.id);
 }
 
 struct need {
@@ -231,23 +251,14 @@ static enum lw_status need_of(const struct lw_world *world, const struct lw_obst
     struct need need = {.chunks = chunks_of(change->vertex_count)};
     for (int i = 0; i < change->count; i++) {
         const int at = lw_world_find(world, change->obstacle[i].id);
-        const struct lw_world_entry *entry = at >= 0 ? &world->entry[at] : NULL;
-        const bool keeps = change->obstacle[i].shape == LW_HULL && change->vertex_count == 0;
-        if (keeps && (entry == NULL || entry->vertex_count == 0))
+        const int vertices = at >= 0 ? world->entry[at].vertex_count : 0;
+        if (change->obstacle[i].shape == LW_HULL && change->vertex_count == 0 && vertices == 0)
             return LW_E_UNKNOWN;
-        need.obstacles += entry == NULL;
-        need.chunks -= entry != NULL ? chunks_of(entry->vertex_count) : 0; // only a hull told anew needs any
+        need.obstacles += at < 0;
+        need.chunks -= chunks_of(vertices); // only a hull told anew needs any
     }
     *out = need;
     return LW_OK;
-}
-
-static bool names(const struct lw_obstacle_change *change, int id)
-{
-    for (int i = 0; i < change->count; i++)
-        if (change->obstacle[i].id == id)
-            return true;
-    return false;
 }
 
 static bool fits(const struct lw_world *world, struct need need)
@@ -265,7 +276,7 @@ static enum lw_status check(const struct lw_world *world, const struct lw_obstac
     if (status != LW_OK || fits(world, need))
         return status;
     for (int at = 0; at < world->count; at++)
-        if (goes(world, change, at) && !names(change, world->entry[at].obstacle.id)) {
+        if (goes(world, change, at) || yields(world, change, at)) {
             need.obstacles--;
             need.chunks -= chunks_of(world->entry[at].vertex_count);
         }
@@ -274,19 +285,41 @@ static enum lw_status check(const struct lw_world *world, const struct lw_obstac
 
 // --- doing it ---
 
-// Drops what goes and was not marked by this change; learns anew what expires first. Returns whether anything went.
+// Drops what goes; learns anew what expires first. Returns whether anything went.
 static bool drop_those_that_go(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     const int before = world->count;
     int64_t earliest_ns = INT64_MAX;
     for (int at = world->count - 1; at >= 0; at--) {
-        if (goes(world, change, at) && world->entry[at].mark != world->mark)
+        if (goes(world, change, at))
             drop(world, at);
         else if (world->expires_ns[at] != 0 && world->expires_ns[at] < earliest_ns)
             earliest_ns = world->expires_ns[at];
     }
     world->earliest_ns = earliest_ns;
     return world->count < before;
+}
+
+// The entry that yields first: what has been over for longest, then by id. -1 = none does.
+static int find_oldest(const struct lw_world *world, const struct lw_obstacle_change *change)
+{
+    int found = -1;
+    for (int at = 0; at < world->count; at++)
+        if ((found < 0 || world->expires_ns[at] < world->expires_ns[found] ||
+             (world->expires_ns[at] == world->expires_ns[found] &&
+              world->entry[at].obstacle.id < world->entry[found].obstacle.id)) &&
+            yields(world, change, at))
+            found = at;
+    return found;
+}
+
+// Takes the places that a change found possible still needs, no more.
+static void make_room(struct lw_world *world, const struct lw_obstacle_change *change)
+{
+    struct need need = {0};
+    bool is_short = need_of(world, change, &need) == LW_OK && !fits(world, need);
+    for (int at = 0; is_short && (at = find_oldest(world, change)) >= 0; is_short = !fits(world, need))
+        drop(world, at);
 }
 
 static void clear(struct lw_world *world)
@@ -311,6 +344,7 @@ static bool remove_named(struct lw_world *world, const struct lw_obstacle_change
 static bool put_named(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     bool changed = false;
+    make_room(world, change);
     for (int i = 0; i < change->count; i++)
         changed |= put(world, change, &change->obstacle[i]);
     return changed;
@@ -323,12 +357,6 @@ static bool make(struct lw_world *world, const struct lw_obstacle_change *change
     if (change->op == LW_CLEAR) {
         clear(world);
         return changed;
-    }
-    world->mark++;
-    for (int i = 0; adds(change) && i < change->count; i++) {
-        const int at = lw_world_find(world, change->obstacle[i].id);
-        if (at >= 0)
-            world->entry[at].mark = world->mark;
     }
     if (change->op == LW_REPLACE || (change->time_ns != 0 && change->time_ns >= world->earliest_ns))
         changed |= drop_those_that_go(world, change);

@@ -32,7 +32,6 @@ struct lw_world_entry {
     int vertex_count;       // 0 = no hull
     int chunk;              // number of its first chunk, from 1
     uint32_t generation;    // another one for every set of vertices
-    int64_t mark;           // change that named it last
 };
 
 struct lw_world_chunk {
@@ -47,7 +46,6 @@ struct lw_world {
     int64_t digest;       // of the set: the sum of those of its obstacles
     int count;
     uint32_t generation;                     // newest one
-    int64_t mark;                            // number of the change that is being made
     int64_t earliest_ns;                     // nothing expires before
     int chunks_touched;                      // chunks in use, and those given back
     int chunks_used;                         // those in use
@@ -64,8 +62,9 @@ struct lw_world {
 // Applies a change of checked obstacles (lw_obstacle_check), their ids unique. The version grows only when the set
 // really differs. An id belongs to the source that sent it last; REMOVE and CLEAR reach obstacles of every source.
 //   hulls    a hull that is named without vertices keeps those it has
-//   expiry   a change that tells its time drops what its own source sent and what has expired by then; nobody's clock
-//            judges the obstacles of another
+//   expiry   a change that tells its time drops what its own source sent and what has expired by then. In a full world
+//            others' expired ones make room for it, too, the oldest first and no more than it needs; else nobody's
+//            clock judges the obstacles of another
 //   order    numbers count by sender and channel; a message that comes again is noted as the newest one heard, because
 //            its sender waits for that, and changes nothing
 // Fails LW_E_OLD when its source has sent a newer message already, LW_E_FULL when there would be more than LW_WORLD_MAX

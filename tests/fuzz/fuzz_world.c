@@ -93,6 +93,20 @@ static struct lw_obstacle_change next_change(struct bytes *in)
 
 // --- rules ---
 
+// What the world holds beside what the records say.
+struct old {
+    int count, chunks;
+    uint64_t digest;
+};
+
+static bool is_named(const struct lw_obstacle_change *c, int id)
+{
+    for (int i = 0; i < c->count; i++)
+        if (c->obstacle[i].id == id)
+            return true;
+    return false;
+}
+
 // Whether there is room for what a change leads to.
 static bool has_room(const struct record *after, int old_count, int old_chunks)
 {
@@ -102,6 +116,33 @@ static bool has_room(const struct record *after, int old_count, int old_chunks)
         chunks += (int)(after[id].vertex_count + LW_CHUNK - 1) / LW_CHUNK;
     }
     return count <= LW_WORLD_MAX && chunks <= LW_WORLD_CHUNKS;
+}
+
+// The record that has to make room first: over by the time that the change tells, for longest, then by id.
+static struct record *oldest(struct record *after, const struct lw_obstacle_change *c)
+{
+    struct record *found = NULL;
+    for (int id = 0; id < MODEL_IDS; id++) {
+        struct record *r = &after[id];
+        const bool over = r->owner != 0 && r->expires_ns != 0 && c->time_ns != 0 && r->expires_ns <= c->time_ns;
+        if (over && !is_named(c, r->obstacle.id) &&
+            (found == NULL || r->expires_ns < found->expires_ns ||
+             (r->expires_ns == found->expires_ns && r->obstacle.id < found->obstacle.id)))
+            found = r;
+    }
+    return found;
+}
+
+// Drops such records until there is room. Returns whether there is.
+static bool make_room(struct record *after, const struct old *left, const struct lw_obstacle_change *c)
+{
+    while (!has_room(after, left->count, left->chunks)) {
+        struct record *r = model_adds(c) ? oldest(after, c) : NULL;
+        if (r == NULL)
+            return false;
+        *r = (struct record){.owner = 0};
+    }
+    return true;
 }
 
 // --- telling ---
@@ -125,12 +166,6 @@ static void check_telling(void)
 
 // --- entry ---
 
-// What the world holds beside what the records say.
-struct old {
-    int count, chunks;
-    uint64_t digest;
-};
-
 static void check_world(const struct record *records, const struct old *old)
 {
     struct model_sum sum;
@@ -139,8 +174,9 @@ static void check_world(const struct record *records, const struct old *old)
     CHECK((uint64_t)world.digest == old->digest + sum.digest);
 }
 
-// What has to come of a change; `after` is what it would lead to, `left` what it would leave of the old.
-static enum lw_status expect(struct record *records, const struct record *after, const struct old *left,
+// What has to come of a change; `after` is what it would lead to, and loses what makes room for
+// it; `left` is what it would leave of the old.
+static enum lw_status expect(struct record *records, struct record *after, const struct old *left,
                              const struct lw_obstacle_change *c)
 {
     const int64_t newest = newest_of(c->stamp.session, (int)lw_change_channel(c));
@@ -148,7 +184,7 @@ static enum lw_status expect(struct record *records, const struct record *after,
         return c->stamp.seq < newest ? LW_E_OLD : LW_OK;
     if (model_is_unknown(records, c))
         return LW_E_UNKNOWN;
-    return has_room(after, left->count, left->chunks) ? LW_OK : LW_E_FULL;
+    return make_room(after, left, c) ? LW_OK : LW_E_FULL;
 }
 
 // Applies a change to world and records, and compares them.

@@ -80,6 +80,69 @@ static void what_goes_makes_room_first(void **state)
     refuse(world, &third, LW_E_FULL);
 }
 
+// A change of one ball that expires after 1 ms.
+static struct lw_obstacle_change brief(int64_t session, int64_t seq, int id, int64_t time_ns)
+{
+    struct lw_obstacle_change c = change(session, seq, LW_UPSERT, ball(id, 1), none);
+    c.time_ns = time_ns;
+    c.valid_for_ms = 1;
+    return c;
+}
+
+// A source that died leaves 10,000 obstacles that are over: they make room, oldest first, as far as it is needed.
+static void what_is_over_makes_room_for_others(void **state)
+{
+    (void)state;
+    struct lw_world *world = empty_world();
+    const int64_t ms = 1000000;
+    for (int id = 1; id <= LW_WORLD_MAX; id++) { // 1 and 2 are over last of those that are, 3 and 4 first
+        const struct lw_obstacle_change c = brief(MINE + 2 + id, 1, id, id <= 2 ? 3 * ms : id > 4 ? 9 * ms : ms);
+        assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    }
+    struct lw_obstacle_change c = brief(YOURS, 1, 90001, 2 * ms - 1); // nothing is over yet
+    refuse(world, &c, LW_E_FULL);
+    c = change(YOURS, 2, LW_UPSERT, ball(90001, 1), none); // tells no time
+    refuse(world, &c, LW_E_FULL);
+    c = brief(YOURS, 3, 90001, INT64_C(1800000000) * 1000 * ms); // goes by the calendar
+    refuse(world, &c, LW_E_FULL);
+    c = change(YOURS, 4, LW_UPSERT, ball(90001, 1), ball(4, 1)); // one place is short, and 4 is named itself
+    c.time_ns = 4 * ms;
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    assert_int_equal(world->count, LW_WORLD_MAX);
+    assert_int_equal(get(world, 3).id, 0);
+    c = brief(YOURS, 5, 90002, 4 * ms);
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    assert_int_equal(get(world, 1).id, 0); // of two alike that with the lower id
+    assert_int_equal(get(world, 2).id, 2);
+    c = change(YOURS, 6, LW_UPSERT, ball(90003, 1), ball(90004, 1)); // there is one place only
+    c.time_ns = 4 * ms;
+    refuse(world, &c, LW_E_FULL);
+    for (int id = 4; id <= LW_WORLD_MAX; id++)
+        assert_int_equal(get(world, id).id, id);
+}
+
+// The vertices of what is over make room, too.
+static void vertices_that_are_over_make_room(void **state)
+{
+    (void)state;
+    enum { FULL_HULLS = LW_WORLD_VERTICES / LW_HULL_MAX };
+    struct lw_world *world = empty_world();
+    for (int id = 1; id <= FULL_HULLS; id++) {
+        struct lw_obstacle_change c = hull(MINE, id, id, LW_HULL_MAX);
+        c.time_ns = c.valid_for_ms = id == 9 ? 1 : 0;
+        assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    }
+    struct lw_obstacle_change c = hull(YOURS, 1, 90001, LW_HULL_MAX);
+    refuse(world, &c, LW_E_FULL);
+    c.time_ns = 2000000;
+    assert_int_equal(lw_world_apply(world, &c), LW_OK);
+    assert_int_equal(world->chunks_used, LW_WORLD_CHUNKS);
+    assert_int_equal(get(world, 9).id, 0);
+    c = hull(YOURS, 2, 90002, 1);
+    c.time_ns = 2000000;
+    refuse(world, &c, LW_E_FULL);
+}
+
 // Vertices count in fours. Those that a hull had are there for its new ones.
 static void vertices_have_their_own_limit(void **state)
 {
@@ -148,10 +211,9 @@ static void vertices_are_given_back(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_ten_thousand_and_first_is_refused),
-        cmocka_unit_test(what_goes_makes_room_first),
-        cmocka_unit_test(vertices_have_their_own_limit),
-        cmocka_unit_test(vertices_are_given_back),
+        cmocka_unit_test(the_ten_thousand_and_first_is_refused), cmocka_unit_test(what_goes_makes_room_first),
+        cmocka_unit_test(what_is_over_makes_room_for_others),    cmocka_unit_test(vertices_that_are_over_make_room),
+        cmocka_unit_test(vertices_have_their_own_limit),         cmocka_unit_test(vertices_are_given_back),
     };
     return cmocka_run_group_tests_name("world_full", tests, NULL, NULL);
 }
