@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from leeway_lcm import leeway as wire
 
@@ -26,6 +28,39 @@ def test_the_address_of_a_bus() -> None:
     for url in ("", "udpm://10.0.0.1:7000", "udpm://239.1.2.3:0", "udpm://239.1.2.3:65536", "x"):
         with pytest.raises(bus.BusError, match="expected udpm"):
             bus.address(url)
+
+
+class Echoing:
+    """A bus on which a controller answers each message with one command."""
+
+    def __init__(self, sessions: list[int]) -> None:
+        self.sessions = sessions  # that the commands echo, one after the other
+
+    def subscribe(self, channel: str, handler: Any) -> None:
+        if channel == "JOINT_COMMAND":
+            self.handler = handler
+
+    def publish(self, channel: str, data: bytes) -> None:
+        command = wire.joint_command_t()
+        if self.sessions:
+            command.request_session = self.sessions.pop(0)
+            self.handler("JOINT_COMMAND", command.encode())
+
+    def handle(self, seconds: float) -> None:
+        pass
+
+
+def test_an_echo_silence_and_a_refusal_are_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bus, "new_session", lambda: 9)
+    monkeypatch.setattr(bus, "REPEAT_S", 0.001)
+    monkeypatch.setattr(bus, "PATIENCE_S", 0.1)
+    own: Any = Echoing([1, 9])
+    assert bus.send_goal(own, None, (1, 1, 1)).request_session == 9
+    own = Echoing([])
+    assert bus.send_goal(own, None, (1, 1, 1)) is None
+    own = Echoing([1, 2])
+    with pytest.raises(bus.NotTaken, match="leeway status"):
+        bus.send_goal(own, None, (1, 1, 1))
 
 
 @pytest.mark.parametrize(

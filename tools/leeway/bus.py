@@ -30,6 +30,10 @@ class BusError(Exception):
     """The bus cannot be used; the text says what to do."""
 
 
+class NotTaken(BusError):
+    """A controller is there and did not echo a message; the text says what to do."""
+
+
 def resolve_url(url: str | None) -> str:
     """Return the URL to use: the argument, else LCM_DEFAULT_URL, else this host alone.
 
@@ -138,14 +142,22 @@ def send_until_echoed(
 
     Returns
     -------
-    The command that echoed it, or None after 2 s without one.
+    The command that echoed it, or None after 2 s without any.
+
+    Raises
+    ------
+    NotTaken
+        Commands came, and none echoed it.
     """
     found: list[Any] = []
+    others = 0
 
     def on_command(_: str, data: bytes) -> None:
+        nonlocal others
         command = decode(wire.joint_command_t, data)
         if command is not None and not found and is_echo(command):
             found.append(command)
+        others += command is not None
 
     bus.subscribe(command_channel, on_command)
     end = time.monotonic() + PATIENCE_S
@@ -154,6 +166,11 @@ def send_until_echoed(
         again = time.monotonic() + REPEAT_S
         while not found and (left := again - time.monotonic()) > 0:
             bus.handle(left)
+    if others and not found:
+        raise NotTaken(
+            f"a controller is there, but did not echo it within {PATIENCE_S:g} s: `leeway status` "
+            "counts by reason what it refused (full: leeway obstacle clear makes room)"
+        )
     return found[0] if found else None
 
 

@@ -249,6 +249,8 @@ def _send(what: str, send: Callable[[Any], Any], common: Common) -> None:
 
     try:
         command = send(bus.open_bus(bus.resolve_url(common.url)))
+    except bus.NotTaken as error:
+        fail(f"{what}: sent, but {error}")
     except bus.BusError as error:
         fail(str(error))
     if command is None:
