@@ -47,6 +47,21 @@ def test_ctrl_c_while_modules_load_ends_without_words(name: str, args: list[str]
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 
 
+@pytest.mark.parametrize("command", [["keys"], ["keys", "--json"], ["obstacle", "--help"]])
+def test_a_full_disk_gets_one_message(command: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run(
+            [sys.executable, "-m", "leeway", *command],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=30,
+            check=False,
+        )
+    assert (result.returncode, result.stderr.count("\n")) == (1, 1)
+    assert result.stderr.startswith("leeway: cannot write: No space left")
+
+
 INTERRUPTED_COMMAND = """
 import os, signal, sys, time
 from leeway import doctor

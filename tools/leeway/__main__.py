@@ -1,5 +1,8 @@
 """`leeway` and `python -m leeway`."""
 
+import errno
+import sys
+
 from leeway import interrupt
 
 
@@ -8,7 +11,17 @@ def main() -> None:
     interrupt.end_quietly()
     from leeway.cli import app
 
-    app()
+    try:
+        try:
+            app()
+        finally:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        sys.stdout = None  # nor may the interpreter try once more
+        sys.exit(f"leeway: cannot write: {error.strerror}")
 
 
 if __name__ == "__main__":
