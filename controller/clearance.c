@@ -103,7 +103,7 @@ static void add_rooms(struct lw_rooms *rooms, const struct lw_near *pair, int pa
 static int kept_behind(const struct lw_body *body, const struct lw_near *pair)
 {
     const bool hull = pair->other == body->tool_part && body->tool.kind == LW_TOOL_HULL;
-    if (pair->obstacle != 0 || hull || body->part[pair->part].length <= body->part[pair->other].length)
+    if (pair->obstacle != 0 || hull || body->length[pair->part] <= body->length[pair->other])
         return pair->part;
     return pair->other;
 }

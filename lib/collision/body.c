@@ -194,7 +194,7 @@ static void find_lengths(struct lw_body *body)
     for (int i = 0; i < body->count; i++) {
         double axis[3];
         lw_vec_sub(body->part[i].capsule.b, body->part[i].capsule.a, axis);
-        body->part[i].length = lw_vec_norm(axis);
+        body->length[i] = lw_vec_norm(axis);
     }
 }
 
@@ -261,7 +261,7 @@ void lw_body_place(const struct lw_body *body, const struct lw_pose frame[LW_NJ]
         place_point(&frame[part->link - 1], part->capsule.a, placed->capsule[i].a);
         place_point(&frame[part->link - 1], part->capsule.b, placed->capsule[i].b);
         placed->capsule[i].r = part->capsule.r;
-        lw_body_mark(placed, i, part->length);
+        lw_body_mark(placed, i, body->length[i]);
     }
     if (body->tool.kind != LW_TOOL_HULL)
         return;

@@ -35,7 +35,6 @@ struct lw_tool {
 struct lw_body_part {
     int link;                  // 1..6
     struct lw_capsule capsule; // m, in the frame of the link; of a tool hull: one that holds it
-    double length;             // m, of the capsule's axis
 };
 
 // Two parts whose distance matters.
@@ -53,6 +52,7 @@ struct lw_body_hull {
 struct lw_body {
     int count;
     struct lw_body_part part[LW_BODY_MAX];
+    double length[LW_BODY_MAX]; // m, of the capsules' axes
     int pair_count; // links 1-3 1-4 1-5 1-6 2-4 2-5 2-6 3-6, the tool like link 6; the model of joints has none
     struct lw_body_pair pair[LW_BODY_PAIRS];
     int tool_part; // -1 = no tool

@@ -227,7 +227,7 @@ static void what_is_no_number_shows(void **state)
         const struct lw_placed good = rig->placed;
         struct lw_capsule *bad = &rig->placed.capsule[3];
         *(k == 6 ? &bad->r : k < 3 ? &bad->a[k] : &bad->b[k - 3]) = NO_NUMBER;
-        lw_body_mark(&rig->placed, 3, rig->body.part[3].length);
+        lw_body_mark(&rig->placed, 3, rig->body.length[3]);
         lw_near_range(&query, &rig->list);
         lw_near_each(&query, each);
         lw_near_smallest(&query, &smallest);
