@@ -365,21 +365,17 @@ static bool make(struct lw_world *world, const struct lw_obstacle_change *change
 
 // --- senders ---
 
-static struct lw_sender *find_sender(struct lw_world *world, int64_t session, int channel)
+// A sender, or who makes room for it: the one unheard for longest.
+static struct lw_sender *place_of_sender(struct lw_world *world, int64_t session, int channel)
 {
-    for (int i = 0; i < LW_SENDERS_MAX; i++)
-        if (world->sender[i].session == session && world->sender[i].channel == channel)
-            return &world->sender[i];
-    return NULL;
-}
-
-// A new sender takes the place of the oldest.
-static struct lw_sender *add_sender(struct lw_world *world, int64_t session, int channel)
-{
-    struct lw_sender *sender = &world->sender[world->next_sender];
-    world->next_sender = (world->next_sender + 1) % LW_SENDERS_MAX;
-    *sender = (struct lw_sender){.session = session, .channel = channel};
-    return sender;
+    struct lw_sender *oldest = &world->sender[0];
+    for (int i = 0; i < LW_SENDERS_MAX; i++) {
+        struct lw_sender *sender = &world->sender[i];
+        if (sender->session == session && sender->channel == channel)
+            return sender;
+        oldest = sender->heard < oldest->heard ? sender : oldest;
+    }
+    return oldest;
 }
 
 // --- the whole ---
@@ -387,21 +383,22 @@ static struct lw_sender *add_sender(struct lw_world *world, int64_t session, int
 enum lw_status lw_world_apply(struct lw_world *world, const struct lw_obstacle_change *change)
 {
     const int channel = (int)lw_change_channel(change);
-    struct lw_sender *sender = find_sender(world, change->stamp.session, channel);
-    if (sender != NULL && change->stamp.seq < sender->seq)
+    const struct lw_stamp *stamp = &change->stamp;
+    struct lw_sender *sender = place_of_sender(world, stamp->session, channel);
+    const bool known = sender->session == stamp->session && sender->channel == channel;
+    if (known && stamp->seq < sender->seq)
         return LW_E_OLD;
-    if (sender == NULL || change->stamp.seq > sender->seq) {
+    if (!known || stamp->seq > sender->seq) {
         const enum lw_status status = check(world, change);
         if (status != LW_OK)
             return status;
-        if (sender == NULL)
-            sender = add_sender(world, change->stamp.session, channel);
-        sender->seq = change->stamp.seq;
+        *sender = (struct lw_sender){.session = stamp->session, .seq = stamp->seq, .channel = channel};
         const bool changed = make(world, change);
         // Hearing anything at all is version 1: an empty world is known, not unheard of.
         world->version += changed || world->version == 0;
     }
-    world->last = change->stamp;
+    sender->heard = ++world->heard;
+    world->last = *stamp;
     world->last_channel = channel;
     return LW_OK;
 }

@@ -21,7 +21,8 @@ enum { LW_SENDERS_MAX = 64, LW_WORLD_SLOTS = 1 << 15, LW_CHUNK = 4, LW_WORLD_CHU
 struct lw_sender {
     int64_t session;
     int64_t seq;
-    int channel; // enum lw_world_channel
+    int channel;   // enum lw_world_channel
+    int64_t heard; // number of its newest message among all that the world heard, 0 = free place
 };
 
 struct lw_world_entry {
@@ -44,14 +45,14 @@ struct lw_world {
     struct lw_stamp last; // of the newest message taken in
     int last_channel;     // enum lw_world_channel of that message
     int64_t digest;       // of the set: the sum of those of its obstacles
+    int64_t heard;        // messages taken in, those that came again too
     int count;
     uint32_t generation;                     // newest one
     int64_t earliest_ns;                     // nothing expires before
     int chunks_touched;                      // chunks in use, and those given back
     int chunks_used;                         // those in use
     int chunk_free;                          // first of those given back
-    int next_sender;                         // place of the next new one
-    struct lw_sender sender[LW_SENDERS_MAX]; // those heard last; the oldest makes room
+    struct lw_sender sender[LW_SENDERS_MAX]; // those heard last; the one unheard for longest makes room
     int slot[LW_WORLD_SLOTS];                // where an id is: index + 1, 0 = free
     int64_t owner[LW_WORLD_MAX];             // session that sent the obstacle last
     int64_t expires_ns[LW_WORLD_MAX];        // 0 = never

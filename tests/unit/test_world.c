@@ -191,18 +191,22 @@ static void each_channel_has_its_own_order(void **state)
     assert_int_equal(world->count, 2);
 }
 
-// More senders than are remembered: the one heard first is forgotten, nothing else is lost.
-static void old_senders_make_room_for_new_ones(void **state)
+// More senders than are remembered: the one unheard for longest is forgotten, nothing else is lost.
+static void quiet_senders_make_room_for_new_ones(void **state)
 {
     (void)state;
     struct lw_world *world = empty_world();
     for (int k = 1; k <= LW_SENDERS_MAX + 1; k++) {
         const struct lw_obstacle_change c = change(1000 + k, 9, LW_UPSERT, ball(k, k), none);
+        const struct lw_obstacle_change first = change(1001, 9 + k, LW_UPSERT, ball(1, k), none);
         assert_int_equal(lw_world_apply(world, &c), LW_OK);
+        assert_int_equal(lw_world_apply(world, &first), LW_OK);
     }
-    const struct lw_obstacle_change forgotten = change(1001, 8, LW_UPSERT, ball(1, 50), none);
-    const struct lw_obstacle_change known = change(1003, 8, LW_UPSERT, ball(3, 50), none);
+    const struct lw_obstacle_change known = change(1001, 9, LW_UPSERT, ball(1, 50), none);
+    const struct lw_obstacle_change forgotten = change(1002, 8, LW_UPSERT, ball(2, 50), none);
+    const struct lw_obstacle_change third = change(1003, 8, LW_UPSERT, ball(3, 50), none);
     assert_int_equal(lw_world_apply(world, &known), LW_E_OLD);
+    assert_int_equal(lw_world_apply(world, &third), LW_E_OLD);
     assert_int_equal(lw_world_apply(world, &forgotten), LW_OK);
     assert_int_equal(world->count, LW_SENDERS_MAX + 1);
 }
@@ -403,7 +407,7 @@ int main(void)
         cmocka_unit_test(every_number_is_compared),
         cmocka_unit_test(messages_of_a_sender_count_once_and_in_order),
         cmocka_unit_test(each_channel_has_its_own_order),
-        cmocka_unit_test(old_senders_make_room_for_new_ones),
+        cmocka_unit_test(quiet_senders_make_room_for_new_ones),
         cmocka_unit_test(a_clock_judges_its_own_obstacles),
         cmocka_unit_test(what_is_named_again_lives_on),
         cmocka_unit_test(hulls_are_named_by_their_ids),
