@@ -210,33 +210,93 @@ double lw_clearance_part(const struct lw_limits *limits, double period_s, const 
     return part;
 }
 
+// How much too fast a wish closes in on a room.
+//   time  in  s, braking time of the wish
+static double excess_of(const struct lw_guard_input *in, const struct lw_room *room, const double wish[LW_NJ],
+                        double time)
+{
+    const double left = room->room - room->approach * (time + in->period_s);
+    return closing_speed(room, wish) - fmax(left, 0) / (time / 2 + in->period_s);
+}
+
+static double product(const double a[LW_NJ], const double b[LW_NJ])
+{
+    double sum = 0;
+    for (int j = 0; j < LW_NJ; j++)
+        sum += a[j] * b[j];
+    return sum;
+}
+
+static void add_scaled(double scale, const double a[LW_NJ], double out[LW_NJ])
+{
+    for (int j = 0; j < LW_NJ; j++)
+        out[j] += scale * a[j];
+}
+
+// One sweep: each room in turn takes its excess out. Returns whether there was none.
+static bool sweep(const struct lw_guard_input *in, const struct lw_rooms *rooms, double time, double wish[LW_NJ])
+{
+    bool fits = true;
+    for (int i = 0; i < rooms->count; i++) {
+        const struct lw_room *room = &rooms->room[i];
+        const double excess = excess_of(in, room, wish, time), square = product(room->gradient, room->gradient);
+        if (excess <= 0 || square == 0)
+            continue;
+        fits = false;
+        add_scaled(excess / square, room->gradient, wish);
+    }
+    return fits;
+}
+
+// The room a wish closes in on too fast most of all, NULL = none.
+static const struct lw_room *tightest(const struct lw_guard_input *in, const struct lw_rooms *rooms, double time,
+                                      const double wish[LW_NJ])
+{
+    const struct lw_room *found = NULL;
+    double most = 0;
+    for (int i = 0; i < rooms->count; i++) {
+        const double excess = excess_of(in, &rooms->room[i], wish, time);
+        if (excess > most) {
+            most = excess;
+            found = &rooms->room[i];
+        }
+    }
+    return found;
+}
+
+// Between rooms at acute angles sweeps come to no end: the directions of those that a wish still closes in on are taken
+// out whole, one orthogonal to the others at a time.
+static void give_way(const struct lw_guard_input *in, const struct lw_rooms *rooms, double time, double wish[LW_NJ])
+{
+    double direction[LW_NJ][LW_NJ];
+    for (int n = 0; n < LW_NJ; n++) {
+        const struct lw_room *room = tightest(in, rooms, time, wish);
+        if (room == NULL)
+            return;
+        double *d = direction[n];
+        memcpy(d, room->gradient, sizeof direction[n]);
+        for (int k = 0; k < n; k++)
+            add_scaled(-product(d, direction[k]), direction[k], d);
+        const double square = product(d, d);
+        if (square <= rounding * product(room->gradient, room->gradient))
+            return;
+        for (int j = 0; j < LW_NJ; j++)
+            d[j] /= sqrt(square);
+        add_scaled(-product(wish, d), d, wish);
+    }
+}
+
 // Takes out of a wish what closes in too fast, room by room, and leaves what goes along: the arm slides past an
-// obstacle instead of standing before it. Several rooms in turn come close to the nearest allowed wish; what they leave
+// obstacle instead of standing before it. Several rooms in turn come close to the nearest allowed wish; what is left
 // over is for the scaling. Returns whether anything was taken.
 static bool slide(const struct lw_guard_input *in, const struct lw_rooms *rooms, double wish[LW_NJ])
 {
-    bool changed = false;
     const double time = braking_time(in->limits, wish);
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        bool fits = true;
-        for (int i = 0; i < rooms->count; i++) {
-            const struct lw_room *room = &rooms->room[i];
-            const double left = room->room - room->approach * (time + in->period_s);
-            const double excess = closing_speed(room, wish) - fmax(left, 0) / (time / 2 + in->period_s);
-            double square = 0;
-            for (int j = 0; j < LW_NJ; j++)
-                square += room->gradient[j] * room->gradient[j];
-            if (excess <= 0 || square == 0)
-                continue;
-            fits = false;
-            for (int j = 0; j < LW_NJ; j++)
-                wish[j] += excess / square * room->gradient[j];
-        }
-        if (fits)
-            return changed;
-        changed = true;
-    }
-    return changed;
+    for (int n = 0; n < SWEEPS; n++)
+        if (sweep(in, rooms, time, wish))
+            return n > 0;
+    give_way(in, rooms, time, wish);
+    return true;
 }
 
 unsigned lw_clearance_command(const struct lw_guard_input *in, const struct lw_rooms *rooms, double command[LW_NJ])

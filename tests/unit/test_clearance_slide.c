@@ -68,6 +68,22 @@ static void the_arm_slides_along_a_room_that_is_used_up(void **state)
     assert_true(closing > 500);
 }
 
+// Two used-up rooms whose planes meet at an acute angle leave a way along both.
+static void the_arm_slides_between_two_rooms(void **state)
+{
+    (void)state;
+    static const double q[LW_NJ] = {0}, wish[LW_NJ] = {0, -1, 0.5};
+    for (int degrees = 1; degrees < 90; degrees += 4) {
+        const double angle = degrees * 3.14159265358979 / 180;
+        double velocity[LW_NJ] = {0};
+        rooms.count = 2;
+        rooms.room[0] = (struct lw_room){.room = -0.005, .gradient = {-cos(angle / 2), sin(angle / 2)}};
+        rooms.room[1] = (struct lw_room){.room = -0.005, .gradient = {cos(angle / 2), sin(angle / 2)}};
+        tick(q, wish, 300, velocity);
+        assert_near(velocity[2], 0.5, 1e-9);
+    }
+}
+
 // What a joint changes by rounding alone does not stop it.
 static void rounding_is_no_closing_in(void **state)
 {
@@ -102,6 +118,7 @@ static void a_larger_wish_is_not_slower(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_arm_slides_along_a_room_that_is_used_up),
+                                       cmocka_unit_test(the_arm_slides_between_two_rooms),
                                        cmocka_unit_test(rounding_is_no_closing_in),
                                        cmocka_unit_test(a_larger_wish_is_not_slower)};
     return cmocka_run_group_tests(tests, NULL, NULL);
