@@ -164,7 +164,7 @@ def is_whole(log: Path) -> bool:
 
 
 def post_mortem(scene: Path, folder: Path) -> Path | None:
-    """Log of a plant that died in mid-run; None when a fault came before, the machine being busy."""
+    """Log of a plant that died in mid-run; None when a fault of a busy machine came before."""
     listener = Listener()
     with running("leeway-controller", scene, f"--post-mortem={folder}"):
         with running("leeway-simulator", scene) as simulator:

@@ -103,7 +103,7 @@ def register(app: typer.Typer, send: Send) -> None:
     ) -> None:
         """Add an obstacle, or replace the one with that id."""
         chosen = number if number is not None else NEW_IDS[0] + secrets.randbelow(NEW_IDS[1])
-        _tell(_draft(chosen, shape, at, size, motion), "at", send, common)
+        _tell(_draft(chosen, shape, at, size, motion), "", send, common)
 
     @command(group, "move", "leeway obstacle move 7 --at 0.5 -0.5 0.3 --velocity 0 0.1 0")
     def move(
@@ -114,8 +114,11 @@ def register(app: typer.Typer, send: Send) -> None:
         motion: Motion,
         common: Common,
     ) -> None:
-        """Put an obstacle elsewhere; its shape stays, and its turn unless --rpy says another."""
-        _tell(_moved(_known(number, common), at, radius, motion), "to", send, common)
+        """Put an obstacle elsewhere; its shape stays, and its turn unless --rpy says another.
+
+        It stands still there, for ever, unless --velocity and --for say otherwise.
+        """
+        _tell(_moved(_known(number, common), at, radius, motion), " moved", send, common)
 
     @command(group, "remove", "leeway obstacle remove 7")
     def remove(number: IdArgument, *, common: Common) -> None:
@@ -123,7 +126,7 @@ def register(app: typer.Typer, send: Send) -> None:
         from leeway import bus
 
         gone = [(number, (0.0, 0.0, 0.0), 0.0)]
-        what = f"obstacle {number} removed"
+        what = f"removal of obstacle {number}"
         send(what, lambda b: bus.send_obstacles(b, common.name, bus.REMOVE, gone), common)
 
     @command(group, "clear", "leeway obstacle clear")
@@ -131,7 +134,7 @@ def register(app: typer.Typer, send: Send) -> None:
         """Remove all obstacles of all senders. Those that a running sensor reports come back."""
         from leeway import bus
 
-        what = "all obstacles removed"
+        what = "removal of all obstacles"
         send(what, lambda b: bus.send_obstacles(b, common.name, bus.CLEAR, []), common)
 
     @command(group, "list", "leeway obstacle list")
@@ -216,10 +219,10 @@ def _moved(old: "Obstacle", at: Triple, radius: float | None, motion: Motion) ->
     return draft
 
 
-def _tell(draft: "Draft", verb: str, send: Send, common: Common) -> None:
+def _tell(draft: "Draft", moved: str, send: Send, common: Common) -> None:
     """Check an obstacle and send it."""
     from leeway import bus
-    from leeway.logs.solids import NAMES
+    from leeway.logs.solids import in_words
     from leeway.obstacles import Refused, clock_ns
 
     def say(own: Any) -> Any:
@@ -230,12 +233,8 @@ def _tell(draft: "Draft", verb: str, send: Send, common: Common) -> None:
         draft.message(1)
     except Refused as error:
         fail(str(error), EXIT_USAGE)
-    x, y, z = draft.p
-    name = "" if draft.shape == 0 else f" ({NAMES[draft.shape]})"
-    what = f"obstacle {draft.number}{name} {verb} {x:g} {y:g} {z:g}"
-    if draft.radius:
-        what += f", radius {draft.radius:g}"
-    send(what, say, common)
+    what = in_words(draft.shape, draft.p, draft.radius, draft.size)
+    send(f"obstacle {draft.number}{moved}, {what}", say, common)
 
 
 # --- what is there ---

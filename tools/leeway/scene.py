@@ -101,7 +101,8 @@ class Run:
     self_clearance : (n,) m, smallest distance of links watched against each other; infinite where
         none is near
     flags : (n,) what shaped the command, bits of joint_command_t
-    outcome : (n,) how the law fared, law_outcome of joint_command_t: 1 ok, 2 no number, 3 stuck, 4 aside
+    outcome : (n,) how the law fared, law_outcome of joint_command_t: 1 ok, 2 no number, 3 stuck,
+        4 aside
     """
 
     scene: Scene

@@ -5,6 +5,7 @@ Units are metres and rad, positions in the base frame of the arm, quaternions w 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +17,20 @@ NAMES = ("sphere", "capsule", "box", "hull", "plane")  # by obstacle_t.shape
 TURNED = (1.0, 0.0, 0.0, 0.0)
 
 Triple = tuple[float, float, float]
+
+
+def in_words(shape: int, p: Sequence[float], radius: float, size: Sequence[float]) -> str:
+    """Say what a solid is and where."""
+    place = ", ".join(f"{v:g}" for v in np.round(p, 4))
+    if shape == HALFSPACE:
+        return f"plane through ({place}) m"
+    what = {
+        SPHERE: f"sphere of radius {radius:g} m" if radius else "point",
+        CAPSULE: f"capsule of radius {radius:g} m and half length {size[0]:g} m",
+        BOX: "box of half extents " + ", ".join(f"{v:g}" for v in size) + " m",
+        HULL: "hull",
+    }
+    return f"{what[shape]} at ({place}) m"
 
 
 @dataclass(frozen=True)
@@ -67,15 +82,5 @@ class Obstacle:
     @property
     def words(self) -> str:
         """What it is and where, for people."""
-        place = ", ".join(f"{v:g}" for v in np.round(self.p, 4))
-        if self.shape == SPHERE:
-            size = f"sphere of radius {self.radius:g} m" if self.radius else "point"
-        elif self.shape == CAPSULE:
-            size = f"capsule of radius {self.radius:g} m and half length {self.size[0]:g} m"
-        elif self.shape == BOX:
-            size = "box of half extents " + ", ".join(f"{v:g}" for v in self.size) + " m"
-        elif self.shape == HULL:
-            size = f"hull of {len(self.vertices)} vertices"
-        else:
-            size = "plane through"
-        return f"{size} at ({place}) m" if self.shape != HALFSPACE else f"{size} ({place}) m"
+        text = in_words(self.shape, self.p, self.radius, self.size)
+        return text.replace("hull", f"hull of {len(self.vertices)} vertices", 1)
