@@ -159,9 +159,7 @@ static void ask_law(const struct lw_controller *config, const struct lw_controll
     config->law->step(&config->params, &in, out->qd_law);
     for (int j = 0; aside != NULL && j < LW_NJ; j++)
         out->qd_law[j] += aside[j];
-    out->law_outcome = !lw_all_finite(out->qd_law, LW_NJ) ? LW_LAW_NO_NUMBER
-                       : aside != NULL                    ? LW_LAW_ASIDE
-                                                          : LW_LAW_OK;
+    out->law_outcome = !lw_all_finite(out->qd_law, LW_NJ) ? LW_LAW_NO_NUMBER : aside != NULL ? LW_LAW_ASIDE : LW_LAW_OK;
     memcpy(out->circulation, state->escape.circulation, sizeof out->circulation);
     double to_goal[3];
     lw_vec_sub(state->request.goal, around->frame[LW_NJ - 1].p, to_goal);
