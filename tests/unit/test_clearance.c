@@ -265,21 +265,28 @@ static void the_reach_covers_what_could_matter(void **state)
 // --- curved ways ---
 
 static struct lw_snapshot one_ball;
+static struct lw_surroundings later; // where braking has led
 static struct lw_body braked;
 static const struct lw_eyes braked_eyes = {.body = &braked, .world = &one_ball, .reach = HUGE_VAL, .self_reach = 0};
 
-// Smallest distance of what can move to the ball while the arm brakes along a straight line in joint space.
-static double smallest_while_braking(const struct lw_limits *l, const double q[LW_NJ], const double velocity[LW_NJ])
+// Tick k of braking along a straight line in joint space. False when the arm has come to rest.
+static bool brake_on(const struct lw_limits *l, const double velocity[LW_NJ], int k, double at[LW_NJ])
 {
-    static struct lw_surroundings later;
-    double at[LW_NJ], time = 0, smallest = HUGE_VAL;
-    memcpy(at, q, sizeof at);
+    double time = 0;
     for (int j = 0; j < LW_NJ; j++)
         time = fmax(time, fabs(velocity[j]) / l->acceleration[j]);
-    for (int k = 0; k * period_s < time; k++) {
-        for (int j = 0; j < LW_NJ; j++)
-            at[j] += period_s * velocity[j] * (1 - k * period_s / time);
-        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, at, &later), LW_OK);
+    for (int j = 0; j < LW_NJ && k * period_s < time; j++)
+        at[j] += period_s * velocity[j] * (1 - k * period_s / time);
+    assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, at, &later), LW_OK);
+    return k * period_s < time;
+}
+
+// Smallest distance of what can move to the ball while the arm brakes.
+static double smallest_while_braking(const struct lw_limits *l, const double q[LW_NJ], const double velocity[LW_NJ])
+{
+    double at[LW_NJ], smallest = HUGE_VAL;
+    memcpy(at, q, sizeof at);
+    for (int k = 0; brake_on(l, velocity, k, at); k++) {
         lw_surroundings_look(&braked_eyes, &later);
         for (int i = 0; i < later.near.count; i++)
             if (later.near.pair[i].obstacle != 0 && !later.near.pair[i].fixed)
@@ -389,20 +396,14 @@ static void what_moves_two_links_alike_is_free(void **state)
     assert_true(near > 100);
 }
 
-// Smallest distance of a pair while the arm brakes along a straight line in joint space.
+// Smallest distance of a pair while the arm brakes.
 static double smallest_between(const struct lw_limits *l, const struct lw_near *pair, const double q[LW_NJ],
                                const double velocity[LW_NJ])
 {
-    static struct lw_surroundings later;
     struct lw_distance distance;
-    double at[LW_NJ], time = 0, smallest = HUGE_VAL;
+    double at[LW_NJ], smallest = HUGE_VAL;
     memcpy(at, q, sizeof at);
-    for (int j = 0; j < LW_NJ; j++)
-        time = fmax(time, fabs(velocity[j]) / l->acceleration[j]);
-    for (int k = 0; k * period_s < time; k++) {
-        for (int j = 0; j < LW_NJ; j++)
-            at[j] += period_s * velocity[j] * (1 - k * period_s / time);
-        assert_int_equal(lw_surroundings_place(lw_arm_get(LW_UR5), &braked, at, &later), LW_OK);
+    for (int k = 0; brake_on(l, velocity, k, at); k++) {
         lw_distance_capsules(&later.placed.capsule[pair->part], &later.placed.capsule[pair->other], &distance);
         smallest = fmin(smallest, distance.d);
     }
